@@ -1,0 +1,54 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+source = click.argument("source", metavar="SOURCE")
+as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, and nothing else there.")
+seed = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed where a scenario is simulated.")
+scenario = click.option("--scenario", metavar="NAME", help="Scenario that a .csv or the CSV on standard input measures.")
+
+
+def estimators(default: str) -> Callable[[F], F]:
+    """Option --with, repeatable; `default` is what runs without it."""
+    return click.option(
+        "--with", "names", metavar="ESTIMATOR", multiple=True, help=f"Estimator, repeatable; see below.  [default: {default}]"
+    )
+
+
+def output(what: str) -> Callable[[F], F]:
+    """Option -o, naming the file that the command writes."""
+    return click.option("-o", "--output", metavar="FILE", help=what)
+
+
+class WithEstimators(click.Command):
+    """A command whose help ends with the estimators that there are."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        from piazzi.estimate.registry import ESTIMATORS
+
+        with formatter.section("Estimators"):
+            formatter.write_dl([(entry.syntax, entry.summary) for entry in ESTIMATORS.values()])
+        super().format_epilog(ctx, formatter)
+
+
+def parsed(names: tuple[str, ...], default: tuple[str, ...]) -> dict[str, Any]:
+    """Estimators by the text that asked for them.
+
+    Raises
+    ------
+    click.UsageError
+        For a name or an option that does not exist.
+    """
+    from piazzi.estimate.registry import parse
+
+    try:
+        return {name.strip(): parse(name) for name in names or default}
+    except ValueError as error:
+        raise click.UsageError(f"--with: {error}", click.get_current_context(silent=True)) from None

@@ -1,0 +1,103 @@
+"""What commands write: text on stdout, progress on stderr, files all at once or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+STDOUT = "-"
+_UNLIMITED = 1000  # columns where nobody looks at a terminal: nothing wraps
+
+
+def print_json(value: Any) -> None:
+    """One strict JSON object on stdout."""
+    _stdout().write(json.dumps(value, allow_nan=False) + "\n")
+
+
+def print_text(text: str) -> None:
+    """Text on stdout as it is."""
+    _stdout().write(text if text.endswith("\n") else text + "\n")
+
+
+def print_rich(*parts: Any) -> None:
+    """Tables and text on stdout: coloured on a terminal, plain and unwrapped in a pipe."""
+    from rich.console import Console
+
+    class Plain(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    stream = _stdout()
+    width = None if stream.isatty() or os.environ.get("COLUMNS", "").isdigit() else _UNLIMITED
+    console = Plain(file=stream, width=width, highlight=False, emoji=False, markup=False)
+    for part in parts:
+        console.print(part)
+
+
+def _stdout() -> Any:
+    if sys.stdout is None:
+        raise ValueError("standard output is closed")
+    return sys.stdout
+
+
+def check_output(path: str | None, endings: Sequence[str]) -> None:
+    """Refuse a file that could not be written, before anything is computed; "-" and None are always fine.
+
+    Raises
+    ------
+    click.UsageError
+        For an ending that is not one of `endings`.
+    OSError
+        Where the folder is missing or nothing can be written there.
+    """
+    if path is None or path == STDOUT:
+        return
+    target = Path(path)
+    if target.suffix.lower() not in endings:
+        raise click.UsageError(f"-o {path}: the file must end in {', '.join(endings)}", click.get_current_context(silent=True))
+    if target.is_dir():
+        raise IsADirectoryError(0, "it is a folder, not a file", path)
+    if target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(0, "it exists and cannot be written", path)
+    check_folder(target.parent, path)
+
+
+def check_folder(folder: Path, path: str) -> None:
+    """Raise OSError unless files can be made in the folder."""
+    if not folder.is_dir():
+        raise FileNotFoundError(0, f"there is no folder {str(folder)!r}" if not folder.exists() else f"{str(folder)!r} is not a folder", path)
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise type(error)(error.errno, f"cannot be written: {error.strerror}", path) from None
+
+
+@contextmanager
+def progress(total: int, long: bool = True) -> Iterator[Callable[[str], None]]:
+    """A function to call with the name of each step as it begins; shows a bar where work is long and stderr is a terminal."""
+    if not (long and sys.stderr is not None and sys.stderr.isatty()):
+        yield lambda step: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(bar_width=24), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=total)
+        done = -1
+
+        def step(name: str) -> None:
+            nonlocal done
+            done += 1
+            bar.update(task, completed=done, description=name)
+
+        yield step

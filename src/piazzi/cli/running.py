@@ -1,0 +1,123 @@
+"""Around every command: errors and warnings as one line each, a quiet end on Ctrl-C and on a closed pipe."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+DONE, INTERNAL, BAD_INPUT, NOT_ESTIMATED = 0, 1, 2, 3
+INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 and the number of the signal, as shells report it
+_LONGEST = 600
+
+
+def run(command: click.Command, arguments: Sequence[str] | None) -> int:
+    """Call a command; returns its exit status, with every error told in one line on stderr."""
+    _prepare_streams()
+    warnings.showwarning = _show_warning
+    logger = logging.getLogger("piazzi.kernels")
+    handler = _Lines()
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        status = _guarded(command, arguments)
+    finally:
+        logger.removeHandler(handler)
+    return status
+
+
+def _guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
+    try:
+        try:
+            status = command.main(arguments, prog_name="piazzi", standalone_mode=False)
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        except click.Abort as error:
+            raise KeyboardInterrupt from error
+        return status if isinstance(status, int) else DONE
+    except KeyboardInterrupt:
+        say("interrupted")
+        return INTERRUPTED
+    except BrokenPipeError:
+        _abandon_stdout()
+        return PIPE_CLOSED
+    except Exception as error:
+        if os.environ.get("PIAZZI_DEBUG", "0") not in ("", "0"):
+            traceback.print_exc()
+        status, message = _told(error)
+        say(message)
+        _abandon_stdout()
+        return status
+
+
+def _told(error: Exception) -> tuple[int, str]:
+    """Exit status and message of an error."""
+    from click.exceptions import NoArgsIsHelpError
+
+    match error:
+        case NoArgsIsHelpError():
+            click.echo(error.format_message(), err=True)
+            return BAD_INPUT, f"a command is missing: piazzi {error.ctx.command.list_commands(error.ctx)[0]}, for example" if isinstance(
+                error.ctx.command, click.Group
+            ) else "arguments are missing"
+        case click.UsageError():
+            path = error.ctx.command_path if error.ctx else "piazzi"
+            where = path.removeprefix("piazzi").strip()
+            return BAD_INPUT, f"{where + ': ' if where else ''}{error.format_message().rstrip('.')} (see {path} --help)"
+        case click.ClickException():
+            return BAD_INPUT, error.format_message()
+        case OSError():
+            names = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, (str, bytes))]
+            return BAD_INPUT, ": ".join([*names[:1], error.strerror or str(error) or type(error).__name__])
+        case ValueError():
+            return BAD_INPUT, str(error)
+        case MemoryError():
+            return BAD_INPUT, f"not enough memory ({error})" if str(error) else "not enough memory"
+        case _:
+            return INTERNAL, f"internal error, {type(error).__name__}: {error} (PIAZZI_DEBUG=1 shows where)"
+
+
+def say(message: str, *, prefix: str = "piazzi: ") -> None:
+    """Write one line to stderr, whatever the message contains."""
+    text = " ".join(str(message).split())
+    text = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+    if len(text) > _LONGEST:
+        text = text[: _LONGEST - 4] + " ..."
+    try:
+        print(prefix + text, file=sys.stderr, flush=True)  # noqa: T201
+    except (OSError, ValueError):  # nobody listens any more
+        pass
+
+
+def _prepare_streams() -> None:
+    """Characters that a terminal cannot show are replaced rather than fatal."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+
+
+def _abandon_stdout() -> None:
+    """Send what is still buffered nowhere, so that the interpreter's last flush cannot fail too."""
+    try:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+    except (OSError, ValueError, AttributeError):
+        pass
+
+
+def _show_warning(message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None) -> None:
+    say(f"warning: {message}")
+
+
+class _Lines(logging.Handler):
+    """Log records as lines on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        say(record.getMessage())

@@ -1,0 +1,63 @@
+"""SOURCE of the command line -> problem and tracking."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from piazzi.problem import Problem, Tracking
+
+STDIN = "-"
+_STARTS = {b"PK": ".npz", b"\x89HDF": ".nc", b"CDF": ".nc"}
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A problem with its tracking, and the name to report them by."""
+
+    problem: Problem
+    tracking: Tracking
+    name: str
+
+
+def load_source(source: str, seed: int, scenario: str | None = None) -> Source:
+    """What `piazzi.load` makes of a source, or of standard input for "-"; raises as that does."""
+    from piazzi.load import load
+
+    if source != STDIN:
+        problem, tracking = load(source, seed=seed, scenario=scenario)
+        return Source(problem, tracking, os.path.basename(source) or source)
+    path = _spooled(scenario)
+    try:
+        problem, tracking = load(path, seed=seed, scenario=scenario)
+    except (ValueError, OSError) as error:
+        text = str(error) if isinstance(error, ValueError) else error.strerror or str(error)
+        raise ValueError(text.replace(str(path), "standard input")) from None
+    finally:
+        path.unlink(missing_ok=True)
+    return Source(problem, tracking, STDIN)
+
+
+def _spooled(scenario: str | None) -> Path:
+    """Standard input as a temporary file whose ending says what its first bytes are."""
+    if sys.stdin is None or sys.stdin.isatty():
+        raise click.UsageError("- means standard input, but nothing is piped into it", click.get_current_context(silent=True))
+    stream = sys.stdin.buffer
+    head = stream.read(8)
+    if not head:
+        raise ValueError("standard input is empty")
+    ending = next((e for start, e in _STARTS.items() if head.startswith(start)), ".csv" if scenario else ".toml")
+    with tempfile.NamedTemporaryFile(prefix="piazzi-", suffix=ending, delete=False) as file:
+        try:
+            file.write(head)
+            shutil.copyfileobj(stream, file)
+        except BaseException:
+            os.unlink(file.name)
+            raise
+    return Path(file.name)

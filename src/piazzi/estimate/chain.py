@@ -1,0 +1,173 @@
+"""Work space of an optimisation over a chain of states: the arrays, and the two ways to solve a linearised chain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.estimate.inputs import Inputs
+from piazzi.kernels.spec import machine_lanes
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+
+# slots of the kernels' report
+MEASUREMENT, DYNAMICS, PRIOR, DEFECT, GRADIENT, FIT, STEP, STEP_SMOOTHED, WIDEST = range(9)
+
+
+def chain_fragments(problem: Problem, *last: str) -> tuple[str, ...]:
+    """Fragments of every estimator that works on a chain of states."""
+    kind = problem.noise_fragment.removeprefix("noise_")
+    return (
+        "transition", problem.noise_fragment, f"linearize_{kind}", "decorrelate", "linearize", "update_components", "epoch", "innovations",
+        "chain", "marginals", *last,
+    )  # fmt: skip
+
+
+def tether_of(problem: Problem) -> Array:
+    """One over the prior sigma of each value, as a diagonal (n, n); 1 where the prior is certain."""
+    sigma = np.sqrt(np.diag(problem.covariance))
+    return np.diag(1.0 / np.where(sigma > 0, sigma, 1.0))
+
+
+class Chain:
+    """States `x` (K, n) of one problem and everything that is linearised about them."""
+
+    def __init__(self, problem: Problem, inputs: Inputs) -> None:
+        self.problem, self.inputs = problem, inputs
+        self.library = kernels.load(problem.spec(*chain_fragments(problem, "graph"), lanes=machine_lanes()))
+        K, N, M = inputs.epochs, problem.model.n, problem.model.width
+        J = len(inputs.z)
+        self.x, self.f, self.Phi = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N))
+        self.Q_all = np.empty((K if problem.process_noise.is_integral else 1, N, N))
+        self.nu, self.H = np.empty((J, M)), np.empty((J, M, N))
+        self.d_pred, self.P_pred = np.empty((K, N)), np.empty((K, N, N))
+        self.multiplier, self.dx = np.zeros((K, N)), np.empty((K, N))
+        self.broken, self.report = np.zeros((K, N)), np.zeros(9)
+        self.tether = tether_of(problem)
+        self._linearize = self._bind_linearize()
+
+    def _bind_linearize(self) -> Callable[[], None]:
+        i, p, N, M = self.inputs, self.problem, self.problem.model.n, self.problem.model.width
+        bound: Callable[[], None] = self.library.graph_linearize.bind(
+            i.epochs, i.t, i.count, i.scale, *i.measured(p), p.given, p.process_noise.covariance, p.mean, p.covariance, self.x, self.f,
+            self.Phi, self.Q_all, self.nu, self.H, np.empty(M * (M + N)), self.tether, np.empty((N, N)), np.empty(N), np.empty(N),
+            self.broken, self.report,
+        )  # fmt: skip
+        return bound
+
+    def linearize(self) -> float:
+        """Linearise about `x`; the cost there, half the sum of squares."""
+        self._linearize()
+        return 0.5 * float(self.report[: PRIOR + 1].sum())
+
+    def widest(self) -> float:
+        """Largest predicted variance of a measurement in units of its noise, after a solve."""
+        i = self.inputs
+        self.library.graph_probe(i.epochs, i.first_row, self.nu, self.H, self.P_pred, self.report)
+        return float(self.report[WIDEST])
+
+    def innovations(self) -> tuple[Array, Array]:
+        """Innovations and their covariances along the final linearisation, (J, m) and (J, m, m)."""
+        i, M, N = self.inputs, self.problem.model.width, self.problem.model.n
+        nu, S = np.empty((len(i.z), M)), np.empty((len(i.z), M, M))
+        self.library.graph_innovations(
+            i.epochs, i.t, *i.measured(self.problem), self.problem.given, self.x, self.d_pred, self.P_pred, np.empty(M), np.empty((M, N)), nu, S
+        )
+        return nu, S
+
+
+class Solver(Protocol):
+    """One way to solve a linearised chain."""
+
+    name: str
+
+    def solve(self, damping: float) -> None:
+        """Leave the Gauss-Newton (or damped) step in the chain's `dx`."""
+
+    def marginals(self) -> Array:
+        """Covariances of all states (K, n, n), after an undamped solve."""
+
+    def cross(self) -> Array:
+        """Covariances of each state with the next (K - 1, n, n), after an undamped solve."""
+
+
+class CovarianceSolver:
+    """Linearised Kalman filter forward, Bryson-Frazier back, covariances by Rauch-Tung-Striebel in Joseph form."""
+
+    name = "chain"
+
+    def __init__(self, chain: Chain) -> None:
+        self.chain = chain
+        rows = int(np.diff(chain.inputs.first_row).max()) * chain.problem.model.width + chain.problem.model.n
+        N = chain.problem.model.n
+        self.gains, self.P_last = np.empty((rows, N + 1)), np.empty((N, N))
+
+    def solve(self, damping: float) -> None:
+        c, i, p = self.chain, self.chain.inputs, self.chain.problem
+        c.library.graph_solve(
+            i.epochs, i.scale, i.first_row, p.process_noise.covariance, p.mean, p.covariance, c.x, c.f, c.Phi, c.Q_all, c.nu, c.H, c.tether,
+            float(damping), c.d_pred, c.P_pred, self.P_last, self.gains, c.multiplier, c.dx, c.report,
+        )  # fmt: skip
+
+    def marginals(self) -> Array:
+        return self._marginals(np.empty((1, 1)), keep_cross=False)
+
+    def cross(self) -> Array:
+        N = self.chain.problem.model.n
+        out = np.empty((self.chain.inputs.epochs - 1, N, N))
+        self._marginals(out, keep_cross=True)
+        return out
+
+    def _marginals(self, cross: Array, keep_cross: bool) -> Array:
+        c, i, N = self.chain, self.chain.inputs, self.chain.problem.model.n
+        covariance = np.empty((i.epochs, N, N))
+        c.library.graph_marginals(
+            i.epochs, i.scale, i.first_row, c.problem.process_noise.covariance, c.Phi, c.Q_all, c.nu, c.H, c.P_pred, self.P_last,
+            np.empty((N, N)), np.empty((N, N)), int(keep_cross), c.dx, covariance, cross, c.report,
+        )  # fmt: skip
+        return covariance
+
+
+class InformationSolver:
+    """Square-root information filter forward, means and covariances back: for priors too wide for covariances."""
+
+    name = "square-root information"
+
+    def __init__(self, chain: Chain) -> None:
+        self.chain = chain
+        K, N = chain.inputs.epochs, chain.problem.model.n
+        fragments = chain_fragments(chain.problem, "graph", "information", "graph_information")
+        self.library = kernels.load(chain.problem.spec(*fragments, lanes=machine_lanes()))
+        self.root = np.ascontiguousarray(np.linalg.solve(np.linalg.cholesky(chain.problem.covariance), np.eye(N)))
+        square, vector = (N, N), (N,)
+        shapes = (square, vector, vector, square, vector, square, vector, square, vector, square, (2 * N, 2 * N + 1), square)
+        self.space = tuple(np.empty(shape) for shape in shapes)
+        self.noise = (np.empty((K, N, N)), np.empty((K, N)), np.empty((K, N, N)))
+        self.covariance = np.empty((K, N, N))
+
+    @staticmethod
+    def applies(problem: Problem) -> bool:
+        """Whether the prior has an inverse: a value known for certain has infinite information."""
+        return bool(np.linalg.eigvalsh(problem.covariance).min() > 0)
+
+    def solve(self, damping: float) -> None:
+        self._solve(damping, np.empty((1, 1)), keep_cross=False)
+
+    def _solve(self, damping: float, cross: Array, keep_cross: bool) -> None:
+        c, i, p = self.chain, self.chain.inputs, self.chain.problem
+        self.library.graph_solve_information(
+            i.epochs, i.scale, i.first_row, p.process_noise.covariance, p.mean, self.root, c.x, c.f, c.Phi, c.Q_all, c.nu, c.H, c.tether,
+            float(damping), *self.space, *self.noise, c.d_pred, c.P_pred, c.multiplier, c.dx, self.covariance, int(keep_cross), cross, c.report,
+        )  # fmt: skip
+
+    def marginals(self) -> Array:
+        return self.covariance.copy()
+
+    def cross(self) -> Array:
+        N = self.chain.problem.model.n
+        out = np.empty((self.chain.inputs.epochs - 1, N, N))
+        self._solve(0.0, out, keep_cross=True)
+        return out

@@ -1,0 +1,119 @@
+"""What every estimator takes and gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import numpy as np
+
+from piazzi.problem import Problem, Tracking
+from piazzi.problem.checks import Array
+
+if TYPE_CHECKING:
+    import xarray
+
+View = Literal["realtime", "delayed"]
+
+
+class Estimator(Protocol):
+    """Frozen settings with one verb."""
+
+    def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
+        """Estimate the state at every epoch of the tracking."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Result of an estimator.
+
+    Attributes
+    ----------
+    problem, tracking : what was estimated
+    times : (K,), epochs, s
+    mean : (K, n), states and estimated constants
+    covariance : (K, n, n)
+    innovations : (J, m), z - h at the predicted state, NaN where missing, one row for each row of the tracking
+    innovation_covariances : (J, m, m)
+    iterations : int
+    seconds : wall-clock time of the estimation alone
+    view : "realtime" (measurements up to each epoch) or "delayed" (later ones too)
+    delayed : a window's states as they left it, else None
+    details : figures of the particular estimator, such as "cost" or "solver"
+    failure : why the estimator gave up, "" where it finished
+    success, message : finished, with finite means and semidefinite covariances; else why not
+    """
+
+    problem: Problem
+    tracking: Tracking
+    mean: Array
+    covariance: Array
+    innovations: Array
+    innovation_covariances: Array
+    iterations: int
+    seconds: float
+    view: View = "realtime"
+    delayed: Estimate | None = None
+    details: Mapping[str, Any] = field(default_factory=dict)
+    failure: str = ""
+
+    def __post_init__(self) -> None:
+        for a in (self.mean, self.covariance, self.innovations, self.innovation_covariances):
+            a.setflags(write=False)
+
+    @property
+    def times(self) -> Array:
+        return self.tracking.times
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns of `mean`."""
+        return self.problem.model.names
+
+    @property
+    def success(self) -> bool:
+        return not self.message
+
+    @cached_property
+    def message(self) -> str:
+        return self.failure or self._defect()
+
+    def _defect(self) -> str:
+        """The first epoch whose result cannot be used, "" if there is none."""
+        finite = np.isfinite(self.mean).all(axis=1) & np.isfinite(self.covariance).all(axis=(1, 2))
+        if not finite.all():
+            return self._at(int(np.argmin(finite)), "the estimate is not finite")
+        sound = semidefinite(self.covariance)
+        return "" if sound.all() else self._at(int(np.argmin(sound)), "the covariance is not semidefinite")
+
+    def _at(self, k: int, what: str) -> str:
+        bad = ~np.isfinite(self.mean[k])
+        state = f" ({', '.join(np.array(self.names)[bad])})" if bad.any() else ""
+        return f"{what} from epoch {k} (t = {self.times[k]:g} s){state}"
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Times, means, covariances and innovations as a labelled dataset with units."""
+        from piazzi.io.netcdf import estimate_to_dataset
+
+        return estimate_to_dataset(self)
+
+
+def semidefinite(P: Array, tolerance: float = 1e-8) -> Array:
+    """For each of the covariances (K, n, n), whether it is positive semidefinite up to rounding, (K,).
+
+    Elimination without pivoting on the correlation matrices, all epochs at once.
+    """
+    sigma = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2), 0.0))
+    unit = np.where(sigma > 0, sigma, 1.0)
+    C = P / (unit[:, :, None] * unit[:, None, :])
+    good = (np.diagonal(P, axis1=1, axis2=2) >= 0).all(axis=1)
+    for j in range(P.shape[1]):
+        pivot = C[:, j, j]
+        column = C[:, j + 1 :, j]
+        firm = pivot > tolerance
+        good &= (pivot >= -tolerance) & (firm | (np.abs(column) <= 10 * np.sqrt(tolerance)).all(axis=1))
+        step = np.where(firm, 1.0 / np.where(firm, pivot, 1.0), 0.0)
+        C[:, j + 1 :, j + 1 :] -= column[:, :, None] * column[:, None, :] * step[:, None, None]
+    return good

@@ -1,0 +1,130 @@
+"""The full factor graph: the most probable path of all states together, and its covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from piazzi.estimate.chain import Chain, CovarianceSolver, InformationSolver, Solver
+from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome, optimize
+from piazzi.estimate.inputs import Inputs, prepare, with_prior_node
+from piazzi.estimate.kalman import filter_run
+from piazzi.estimate.sliding_window import SlidingWindow
+from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.problem import Problem, Tracking
+from piazzi.problem.checks import Array, numeric
+
+STARTS = ("ekf", "prior", "window")
+SOLVERS = ("auto", "chain", "information")
+# predicted over noise variance of one measurement beyond which a covariance keeps less than four digits of what is left
+DIFFUSE = 1e12
+
+
+@dataclass(frozen=True, eq=False)
+class FactorGraph:
+    """Maximum a posteriori estimate of every state, by Gauss-Newton on prior, dynamics and measurement factors.
+
+    Parameters
+    ----------
+    start : "ekf", "prior", "window", or states (K, n)
+        Where the iterations begin.
+    max_iterations : int
+    tolerance : float
+        Converged when no state moves by more than this many of its standard deviations.
+    cross_covariances : bool
+        Keep Cov(x[k], x[k+1]) as ``details["cross_covariances"]``, shape (K - 1, n, n).
+    solver : "auto", "chain" or "information"
+        Covariances, or their square-root information for priors more than about a million times as wide as what the
+        measurements leave; "auto" decides, and ``details["solver"]`` tells.
+
+    Notes
+    -----
+    Each step is a linearised Kalman filter forward and a Bryson-Frazier recursion back, so process noise may be singular or
+    zero.  Steps that raise the cost are damped (Levenberg-Marquardt, scaled by the prior covariance), except the first, whose
+    cost says nothing: a start that leaves the dynamics has any cost at all.  With singular noise "cost" uses the
+    pseudo-inverse of Q and stands beside "defect", the largest violation of the dynamics in prior standard deviations.
+    """
+
+    start: Any = "ekf"
+    max_iterations: int = 50
+    tolerance: float = 1e-6
+    cross_covariances: bool = False
+    solver: str = "auto"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.start, str) and self.start not in STARTS:
+            raise ValueError(f"start is {self.start!r}; it must be one of {', '.join(STARTS)}, or states")
+        if self.solver not in SOLVERS:
+            raise ValueError(f"solver is {self.solver!r}; it must be one of {', '.join(SOLVERS)}")
+        if self.max_iterations < 1:
+            raise ValueError(f"max_iterations is {self.max_iterations}; it must be 1 or more")
+        if not self.tolerance > 0:
+            raise ValueError(f"tolerance is {self.tolerance}; it must be positive")
+
+    def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
+        """Smoothed means and covariances at every epoch; `success` is False where the iterations do not converge.
+
+        Raises
+        ------
+        ValueError
+            Where the tracking does not fit the problem, or the start has the wrong shape.
+        """
+        inputs = prepare(problem, tracking)
+        nodes = with_prior_node(inputs)
+        skip = nodes.epochs - inputs.epochs
+        watch = Stopwatch()
+        chain = Chain(problem, nodes)
+        outcome, solver, used = self._optimize(chain, inputs, tracking)
+        nu, S = chain.innovations()
+        details = outcome.details | {"start": used}
+        if self.cross_covariances and not outcome.failure:
+            details["cross_covariances"] = solver.cross()[skip:]
+        return Estimate(
+            problem, tracking, chain.x[skip:], outcome.covariance[skip:], nu, S, outcome.iterations, watch.seconds(), "delayed", None, details,
+            outcome.failure,
+        )  # fmt: skip
+
+    def _optimize(self, chain: Chain, inputs: Inputs, tracking: Tracking) -> tuple[Outcome, Solver, str]:
+        """Optimise from the start asked for; the outcome, its solver, and the starts used.
+
+        Where the prior turns out too wide for covariances, once more in information form, from the prior (a filter cannot have
+        worked); where the iterations fail, once more from a window.
+        """
+        used = self.start if isinstance(self.start, str) else "given"
+        solver: Solver = InformationSolver(chain) if self.solver == "information" else CovarianceSolver(chain)
+        first = self._run(chain, solver, self.start, inputs, tracking, self.solver == "auto")
+        if first.failure == TOO_WIDE:
+            solver, used = InformationSolver(chain), "given" if used == "given" else "prior"
+            first = self._run(chain, solver, self.start if used == "given" else "prior", inputs, tracking)
+        if not first.failure or used == "window":
+            return first, solver, used
+        second = self._run(chain, solver, "window", inputs, tracking)
+        return replace(second, iterations=first.iterations + second.iterations), solver, f"{used}, then window"
+
+    def _run(self, chain: Chain, solver: Solver, start: Any, inputs: Inputs, tracking: Tracking, narrow: bool = False) -> Outcome:
+        states = with_first(chain, self._begin(start, chain.problem, tracking, inputs))
+        check = narrow and InformationSolver.applies(chain.problem)
+        return optimize(chain, solver, states, self.max_iterations, self.tolerance, DIFFUSE if check else np.inf)
+
+    def _begin(self, start: Any, problem: Problem, tracking: Tracking, inputs: Inputs) -> Array:
+        """States to start from, (K, n)."""
+        K, n = len(tracking.times), problem.model.n
+        if not isinstance(start, str):
+            states = numeric(start, "start")
+            if states.shape != (K, n) or not np.isfinite(states).all():
+                raise ValueError(f"start has shape {states.shape}; it must be ({K}, {n}), and finite")
+            return states
+        if start == "window":
+            first = SlidingWindow().estimate(problem, tracking)
+            assert first.delayed is not None
+            return first.delayed.mean
+        seen = inputs if start == "ekf" else replace(inputs, z=np.full_like(inputs.z, np.nan))
+        return filter_run(problem, seen)[0]
+
+
+def with_first(chain: Chain, states: Array) -> Array:
+    """States at all nodes of the chain: before those of the epochs, the prior mean where the chain begins earlier."""
+    return np.vstack([chain.problem.mean] * (chain.inputs.epochs - len(states)) + [states])

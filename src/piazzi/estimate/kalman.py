@@ -1,0 +1,147 @@
+"""The extended Kalman filter: its two steps, and whole runs."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.inputs import Inputs, prepare, scratch
+from piazzi.problem import Gaussian, Problem, Tracking
+from piazzi.problem.checks import Array, covariance, finite_vector, numeric
+
+Update = Literal["auto", "joint", "components"]
+
+
+def update_fragments(problem: Problem, update: Update) -> tuple[str, ...]:
+    """The fragments that do the update: by components where every R is diagonal, unless told otherwise."""
+    if update == "auto":
+        update = "joint" if problem.station_correlated.any() else "components"
+    return ("decorrelate", "update_components", "epoch") if update == "components" else ("update_joint", "epoch")
+
+
+@dataclass(frozen=True)
+class ExtendedKalmanFilter:
+    """Kalman filter about the current estimate, with the Jacobian of the step that was taken.
+
+    Parameters
+    ----------
+    update : "auto", "joint" or "components"
+        All components of a measurement at once, or one after the other (a full R is decorrelated first); the results are
+        equal.  "auto" takes components where every R is diagonal.
+
+    Notes
+    -----
+    Jazwinski, Stochastic Processes and Filtering Theory (1970), ch. 8; covariance updates in Joseph form.  All measurements
+    of one epoch are linearised once, at the predicted state.
+    """
+
+    update: Update = "auto"
+
+    def __post_init__(self) -> None:
+        if self.update not in get_args(Update):
+            raise ValueError(f"update is {self.update!r}; it must be one of {', '.join(get_args(Update))}")
+
+    def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
+        """Filtered means and covariances at every epoch.
+
+        Raises
+        ------
+        ValueError
+            Where the tracking does not fit the problem.
+        """
+        inputs = prepare(problem, tracking)
+        mean, P, nu, S, seconds = filter_run(problem, inputs, self.update)
+        return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs, seconds)
+
+
+def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tuple[Array, Array, Array, Array, float]:
+    """Means (K, n), covariances (K, n, n), innovations (J, m), their covariances (J, m, m), and the seconds it took."""
+    library = kernels.load(problem.spec("transition", problem.noise_fragment, *update_fragments(problem, update), "filter"))
+    K, n, (J, m) = inputs.epochs, problem.model.n, inputs.z.shape
+    mean, P = np.empty((K, n)), np.empty((K, n, n))
+    nu, S = np.empty((J, m)), np.empty((J, m, m))
+    started = time.perf_counter()
+    library.run_filter(
+        K, inputs.t, inputs.t_prior, inputs.count, inputs.scale, *inputs.measured(problem), problem.given,
+        problem.process_noise.covariance, problem.mean, problem.covariance, *scratch(problem), mean, P, nu, S,
+    )  # fmt: skip
+    return mean, P, nu, S, time.perf_counter() - started
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """A belief carried forward: mean (n,), covariance (n, n), and the transition matrix Phi and process noise Q that did it."""
+
+    mean: Array
+    covariance: Array
+    Phi: Array
+    Q: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Updated:
+    """A belief after a measurement: mean (n,), covariance (n, n), innovation (m,) and its covariance (m, m)."""
+
+    mean: Array
+    covariance: Array
+    innovation: Array
+    innovation_covariance: Array
+
+
+def predict(problem: Problem, belief: Any, t: float, dt: float) -> Prediction:
+    """Carry a belief (anything with `mean` and `covariance`) from time `t` over `dt` seconds.
+
+    Raises
+    ------
+    ValueError
+        For wrong shapes, or `dt` not positive.
+    """
+    if not (np.isfinite(dt) and dt > 0):
+        raise ValueError(f"dt is {dt} s; a prediction goes forward")
+    x, P = _belief(problem, belief)
+    assert problem.integrator is not None
+    interval = np.array([float(dt)])
+    count, scale = int(problem.integrator.counts(interval)[0]), float(problem.process_noise.scale(interval)[0])
+    Phi, Q = np.empty_like(P), np.empty_like(P)
+    library = kernels.load(problem.spec("transition", problem.noise_fragment, "predict"))
+    library.predict_once(float(t), float(dt), count, scale, problem.given, problem.process_noise.covariance, x, P, Phi, Q)
+    return Prediction(x, P, Phi, Q)
+
+
+def update(problem: Problem, belief: Any, station: str, z: Any, t: float = 0.0, method: Update = "auto") -> Updated:
+    """Take in one measurement of a station, NaN where a component is missing.
+
+    Raises
+    ------
+    ValueError
+        For wrong shapes or an unknown station.
+    """
+    x, P = _belief(problem, belief)
+    s = problem.station_index(station)
+    width, m = len(problem.stations[s].noise), problem.model.width
+    values = numeric(z, f"measurement of station {station!r}").reshape(-1)
+    if values.shape != (width,) or np.isinf(values).any():
+        raise ValueError(f"measurement of station {station!r} is {z!r}; it must be {width} numbers, NaN where missing")
+    row = np.full((1, m), np.nan)
+    row[0, :width] = values
+    nu, S = np.empty((1, m)), np.empty((1, m, m))
+    library = kernels.load(problem.spec("transition", *update_fragments(problem, method), "update"))
+    library.update_once(
+        s, float(t), row, problem.station_sensor, problem.station_numbers, problem.station_noise, problem.station_correlated,
+        problem.given, *scratch(problem), x, P, nu, S,
+    )  # fmt: skip
+    return Updated(x, P, nu[0, :width], S[0, :width, :width])
+
+
+def _belief(problem: Problem, belief: Any) -> tuple[Array, Array]:
+    """Writable copies of a belief's mean and covariance."""
+    names = problem.model.names
+    if belief is problem.prior or (isinstance(belief, Gaussian) and np.size(belief.mean) == len(problem.model.states) < len(names)):
+        belief = Gaussian([*belief.mean, *problem.mean[len(problem.model.states) :]], problem.covariance)
+    mean = finite_vector(belief.mean, len(names), "mean", names)
+    return mean.copy(), covariance(belief.covariance, len(names), "covariance", names).copy()

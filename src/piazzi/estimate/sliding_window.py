@@ -1,0 +1,99 @@
+"""A factor graph over the newest states only; older ones live on in the prior of the oldest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.estimate.chain import chain_fragments
+from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.inputs import Inputs, prepare
+from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.kernels.spec import machine_lanes
+from piazzi.problem import Problem, Tracking
+from piazzi.problem.checks import Array
+
+
+@dataclass(frozen=True)
+class SlidingWindow:
+    """Factor graph over the most recent `lag` states, moved on by one at every epoch.
+
+    Parameters
+    ----------
+    lag : int
+        States kept, the newest included.
+    iterations : int
+        Gauss-Newton steps per epoch.
+    lag_seconds : float, optional
+        Keep the states of the last so many seconds instead.
+
+    Notes
+    -----
+    `Estimate.mean` is the newest state as known in real time; `Estimate.delayed` has each state as it left the window, and
+    for those still inside at the end the final window's estimate.  A state that leaves is marginalised by one linearised
+    Kalman step: its measurements keep the linearisation of its last step, its dynamics are linearised at its current estimate.
+    One state and one iteration are the extended Kalman filter; all states, iterated, are the full graph.
+    """
+
+    lag: int = 100
+    iterations: int = 1
+    lag_seconds: float | None = None
+
+    def __post_init__(self) -> None:
+        for what in ("lag", "iterations"):
+            value = getattr(self, what)
+            if value != int(value) or value < 1:
+                raise ValueError(f"{what} is {value}; it must be a whole number of 1 or more")
+        if self.lag_seconds is not None and not 0 <= self.lag_seconds < float("inf"):
+            raise ValueError(f"lag_seconds is {self.lag_seconds}; it must be zero or more")
+
+    def first_states(self, times: Array) -> Array:
+        """Index of the oldest state in the window at each epoch, (K,) int64."""
+        newest = np.arange(len(times), dtype=np.int64)
+        if self.lag_seconds is None:
+            return np.maximum(newest - (self.lag - 1), 0)
+        return np.searchsorted(times, times - self.lag_seconds * (1 + 1e-12)).astype(np.int64)
+
+    def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
+        """Real-time means and covariances at every epoch, with the delayed ones beside them.
+
+        Raises
+        ------
+        ValueError
+            Where the tracking does not fit the problem.
+        """
+        inputs = prepare(problem, tracking)
+        begin = self.first_states(inputs.t)
+        library = kernels.load(problem.spec(*chain_fragments(problem, "window"), lanes=machine_lanes()))
+        K, N, M = inputs.epochs, problem.model.n, problem.model.width
+        J = len(inputs.z)
+        x, mean, P, P_delayed = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N)), np.empty((K, N, N))
+        nu, S = np.empty((J, M)), np.empty((J, M, M))
+        watch = Stopwatch()
+        library.run_window(
+            K, begin, self.iterations, inputs.t, inputs.t_prior, inputs.count, inputs.scale, *inputs.measured(problem), problem.given,
+            problem.process_noise.covariance, problem.mean, problem.covariance, *window_space(problem, inputs, begin),
+            x, P_delayed, mean, P, nu, S,
+        )  # fmt: skip
+        seconds = watch.seconds()
+        details = {"lag": self.lag if self.lag_seconds is None else None, "lag_seconds": self.lag_seconds, "solver": "chain"}
+        steps = K * self.iterations
+        late = Estimate(problem, tracking, x, P_delayed, nu, S, steps, seconds, "delayed", None, details)
+        return Estimate(problem, tracking, mean, P, nu, S, steps, seconds, "realtime", late, details)
+
+
+def window_space(problem: Problem, inputs: Inputs, begin: Array) -> tuple[Array, ...]:
+    """Buffers of the largest window, in the order of the kernel."""
+    N, M = problem.model.n, problem.model.width
+    newest = np.arange(len(begin))
+    W = int((newest - begin).max()) + 1
+    rows = int((inputs.first_row[newest + 1] - inputs.first_row[begin]).max()) * M
+    in_epoch = int(np.diff(inputs.first_row).max()) * M
+    Q_all = np.empty((W if problem.process_noise.is_integral else 1, N, N))
+    return (
+        np.empty((W, N)), np.empty((W, N, N)), Q_all, np.empty(rows), np.empty((rows, N)), np.empty((W, N)), np.empty((W, N, N)),
+        np.empty((in_epoch + N, N + 1)), np.empty((W, N)), np.empty((W, N)), np.empty(M), np.empty((M, N)), np.empty(M * (M + N)),
+        np.empty((N, N)), np.empty((N, N)),
+    )  # fmt: skip

@@ -1,0 +1,211 @@
+"""A comparison as a table, and as a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, number, sigma_factor, unit_of
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, RenderResult
+
+    from piazzi.evaluate.compare import Comparison, Row
+
+_VIEW = {"realtime": "real time", "delayed": "delayed"}
+_TEXT_COLUMNS = 2  # name and view, before the numbers
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of the table: its name, which part of the run it covers, its unit or remark, and the text of every row."""
+
+    name: str
+    part: str
+    unit: str
+    texts: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        return f"{self.name}, {self.part}" if self.part else self.name
+
+
+def group_display(comparison: Comparison, group: str) -> Display:
+    """The unit to show the errors of a group of states in, one for all rows."""
+    model = comparison.problem.model
+    unit = unit_of(model.unit(s) for s in dict(model.groups).get(group, (group,)))
+    return display_of(unit, [v for r in comparison.rows for v in (r.rmse.get(group), r.rmse_last_half.get(group))])
+
+
+def columns(comparison: Comparison) -> list[Column]:
+    """Everything the table shows; columns without any value are left out."""
+    rows = comparison.rows
+    found = [
+        Column("estimator", "", "", tuple(r.estimator for r in rows)),
+        Column("view", "", "", tuple(_VIEW.get(r.view, r.view) for r in rows)),
+    ]
+    for group in dict.fromkeys(g for r in rows for g in r.rmse):
+        show = group_display(comparison, group)
+        for part, values in (("whole run", [r.rmse for r in rows]), ("last half", [r.rmse_last_half for r in rows])):
+            shown = (number(_times(v.get(group), show.factor)) for v in values)
+            found.append(Column(f"{group} RMSE", part, show.unit, tuple(shown)))
+    ideal_nis = number(expected_nis(comparison), 3)
+    found += [
+        Column("mean NEES", "whole run", f"ideal {comparison.problem.model.n}", tuple(number(r.mean_nees, 3) for r in rows)),
+        Column("mean NEES", "last half", f"ideal {comparison.problem.model.n}", tuple(number(r.mean_nees_last_half, 3) for r in rows)),
+        Column("mean NIS", "", f"ideal {ideal_nis}", tuple(number(r.mean_nis, 3) for r in rows)),
+        Column("iterations", "", "", tuple(str(r.iterations) if r.iterations else NOTHING for r in rows)),
+        Column("time", "", "", tuple(duration(r.seconds) for r in rows)),
+        Column("", "", "", tuple(_remark(r) for r in rows)),
+    ]
+    return [c for i, c in enumerate(found) if i < _TEXT_COLUMNS or any(v not in ("", NOTHING) for v in c.texts)]
+
+
+def _times(value: float | None, factor: float) -> float | None:
+    return None if value is None else value * factor
+
+
+def _remark(row: Row) -> str:
+    return "FAILED" if not row.success else "diverged" if row.diverged else ""
+
+
+def expected_nis(comparison: Comparison) -> float | None:
+    """Mean number of components per row of measurements: what a mean NIS should be near."""
+    present = (~np.isnan(comparison.tracking.values)).sum(axis=1)
+    return float(present[present > 0].mean()) if present.any() else None
+
+
+def html(comparison: Comparison) -> str:
+    """The table and its sentences for a notebook; all text is escaped."""
+    shown = columns(comparison)
+    head = "".join(f"<th>{escape(c.title)}{f'<br><small>{escape(c.unit)}</small>' if c.unit else ''}</th>" for c in shown)
+    rows = zip(*(c.texts for c in shown), strict=True)
+    body = "".join("<tr>" + "".join(f"<td>{escape(v)}</td>" for v in row) + "</tr>" for row in rows)
+    says = "".join(f"<p>{escape(line)}</p>" for line in sentences(comparison))
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{says}"
+
+
+def render(comparison: Comparison, console: Console, options: ConsoleOptions) -> RenderResult:
+    """The comparison for rich, then its sentences.
+
+    All columns where they fit the width; else those of the last half; else a block of lines for each row.
+    """
+    from rich.measure import Measurement
+    from rich.text import Text
+
+    everything = columns(comparison)
+    fewer = [c for c in everything if c.part != "whole run" and c.name != "iterations"]
+    for chosen in (everything, fewer):
+        table = wide_table(chosen)
+        if Measurement.get(console, options.update(max_width=10_000), table).maximum <= options.max_width:
+            yield table
+            if chosen is not everything:
+                yield Text("A wider terminal shows the whole run too.", style="dim")
+            break
+    else:
+        yield from blocks(everything)
+    for line in sentences(comparison):
+        yield Text(line)
+
+
+def wide_table(shown: Sequence[Column]) -> Any:
+    """A rich table that does not wrap."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, header_style="bold", show_edge=False, padding=(0, 1, 0, 0))
+    for i, c in enumerate(shown):
+        heading = Text("\n".join([*c.name.split(), *filter(None, (c.part, c.unit))]))
+        table.add_column(heading, justify="left" if i < _TEXT_COLUMNS or not c.name else "right", no_wrap=True, vertical="bottom")
+    for row in zip(*(c.texts for c in shown), strict=True):
+        table.add_row(*(Text(v, style=_style(v)) for v in row))
+    return table
+
+
+def blocks(shown: Sequence[Column]) -> Iterable[Any]:
+    """For narrow terminals: every row as a title and lines of name and value."""
+    from rich.table import Table
+    from rich.text import Text
+
+    for row in zip(*(c.texts for c in shown), strict=True):
+        remark = [row[-1]] if _style(row[-1]) else []
+        yield Text(" ".join([row[0], f"({row[1]})", *remark]), style="bold")
+        table = Table.grid(padding=(0, 2))
+        for c, value in list(zip(shown, row, strict=True))[_TEXT_COLUMNS:]:
+            if c.name and value != NOTHING:
+                table.add_row(f"  {c.title}", Text(" ".join([value, _bracket(c.unit)]).strip()))
+        yield table
+        yield Text("")
+
+
+def _bracket(unit: str) -> str:
+    return f"({unit})" if " " in unit else unit
+
+
+def _style(value: str) -> str:
+    return {"FAILED": "bold red", "diverged": "bold yellow"}.get(value, "")
+
+
+# ---- what it means -------------------------------------------------------------------------------------------------------
+
+
+def sentences(comparison: Comparison) -> list[str]:
+    """What the table means, in plain words: who is best, who admits their errors, who failed."""
+    sound = [r for r in comparison.rows if r.success and not r.diverged]
+    out = [f"{r.estimator} did not succeed: {r.message}." for r in comparison.rows if not r.success]
+    wayward = dict.fromkeys(r.estimator for r in comparison.rows if r.success and r.diverged)
+    out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down." for name in wayward]
+    if not sound:
+        return out
+    if not any(v is not None for r in sound for v in r.rmse.values()):
+        return [*out, *_without_truth(comparison, sound)]
+    return [*out, *_best(comparison, sound), *_honest(comparison, sound)]
+
+
+def _without_truth(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
+    expected = expected_nis(comparison)
+    out = ["There is no truth to compare with, so errors are unknown."]
+    for r in rows:
+        if r.mean_nis is not None and expected:
+            out.append(f"Innovations of {r.estimator} are {_times_as_large(sigma_factor(r.mean_nis, expected))} (NIS).")
+    return out
+
+
+def _best(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
+    group = next(g for r in rows for g, v in r.rmse_last_half.items() if v is not None)
+    ranked = [(v, r.estimator, r.view) for r in rows if (v := r.rmse_last_half.get(group)) is not None]
+    show = group_display(comparison, group)
+    ranked.sort(key=lambda found: float(f"{found[0]:.3e}"))  # a difference that is not shown is no difference
+    value, name, view = ranked[0]
+    error = f"{number(value * show.factor)}{show.suffix}"
+    if len(ranked) == 1:
+        return [f"In the last half of the run the {group} error of {name} is {error} (RMS)."]
+    return [f"Smallest {group} error in the last half of the run: {name} ({_VIEW.get(view, view)}), {error} (RMS)."]
+
+
+def _honest(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
+    n = comparison.problem.model.n
+    by_claim: dict[str, list[str]] = {}
+    for r in rows:
+        if r.mean_nees_last_half is not None and np.isfinite(r.mean_nees_last_half):
+            view = f" ({_VIEW.get(r.view, r.view)})" if sum(o.estimator == r.estimator for o in rows) > 1 else ""
+            by_claim.setdefault(_times_as_large(sigma_factor(r.mean_nees_last_half, n)), []).append(r.estimator + view)
+    return [f"Errors of {_list(names)} are {claim} (NEES of this one run)." for claim, names in by_claim.items()]
+
+
+def _times_as_large(factor: float) -> str:
+    """How errors compare with their covariance; one run cannot tell less than a factor of 1.5."""
+    if 1 / 1.5 <= factor <= 1.5:
+        return "about as large as the covariance says"
+    if factor > 1:
+        return f"about {number(factor, 2)} times as large as the covariance says"
+    return f"about {number(1 / factor, 2)} times smaller than the covariance says" if factor > 0 else "zero"
+
+
+def _list(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]

@@ -1,0 +1,199 @@
+"""Errors of an estimate, and whether its covariance admits them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from piazzi.estimate import Estimate
+from piazzi.evaluate.chi_square import quantile
+from piazzi.problem.checks import Array
+
+_CHUNK = 1 << 14  # epochs at a time: the work space stays in the processor's cache
+_FAR = 10.0  # times the 99.9 % quantile of chi-square: no matched run comes near, however correlated in time
+
+
+@dataclass(frozen=True, eq=False)
+class Consistency:
+    """Squared errors in units of their covariance, and the number of directions that each was summed over.
+
+    `rank` is zero where there is nothing to compare, below the number of components where some are missing, and smaller still
+    where the covariance is singular: `value` is then taken with the pseudo-inverse.  `value` is NaN where the estimate is.
+    """
+
+    value: Array
+    rank: Array
+
+    def mean(self, rows: slice = slice(None)) -> float | None:
+        """Mean over the rows that can be compared, None where there are none."""
+        known = self.value[rows][self.rank[rows] > 0]
+        return float(known.mean()) if known.size else None
+
+
+def errors(estimate: Estimate) -> Array | None:
+    """Estimate minus truth, (K, n), NaN where either is; None where nothing of the truth is known.
+
+    A truth without columns for the estimated constants leaves their errors unknown.
+
+    Raises
+    ------
+    ValueError
+        For a truth of another width.
+    """
+    truth = known_truth(estimate)
+    return None if truth is None else estimate.mean - truth
+
+
+def known_truth(estimate: Estimate) -> Array | None:
+    """Truth with a column for everything estimated, (K, n), NaN where unknown; None where nothing is known."""
+    truth, model = estimate.tracking.truth, estimate.problem.model
+    if truth is None or np.isnan(truth).all():
+        return None
+    columns = truth.shape[1]
+    if columns not in (len(model.states), model.n):
+        raise ValueError(f"truth has {columns} columns; the model has {len(model.states)} states ({', '.join(model.states)})")
+    out = np.full_like(estimate.mean, np.nan)
+    out[:, :columns] = truth
+    return out
+
+
+def rmse(estimate: Estimate, columns: Sequence[int], rows: slice = slice(None)) -> float | None:
+    """Square root of the mean over epochs of the squared length of the error in these columns, None without truth.
+
+    Epochs whose truth is not known are left out; an estimate that is not finite makes the result so.
+    """
+    truth = known_truth(estimate)
+    if truth is None:
+        return None
+    error = (estimate.mean - truth)[rows, list(columns)]
+    return _rms(error[~np.isnan(truth[rows, list(columns)]).any(axis=1)])
+
+
+def _rms(vectors: Array) -> float | None:
+    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1)))) if len(vectors) else None
+
+
+def nees(estimate: Estimate) -> Consistency | None:
+    """Normalised estimation error squared, e^T P^-1 e, of every epoch, (K,); None without truth."""
+    truth = known_truth(estimate)
+    return None if truth is None else squared_in_sigmas(estimate.mean - truth, estimate.covariance, ~np.isnan(truth))
+
+
+def nis(estimate: Estimate) -> Consistency:
+    """Normalised innovation squared, nu^T S^-1 nu, of every row of measurements, (J,), over the components that are there."""
+    measured = ~np.isnan(estimate.tracking.padded(estimate.innovations.shape[1]))
+    return squared_in_sigmas(estimate.innovations, estimate.innovation_covariances, measured)
+
+
+def squared_in_sigmas(e: Array, P: Array, present: Array) -> Consistency:
+    """e^T P^-1 e for vectors (K, n) and covariances (K, n, n), over the components that are `present`, (K, n).
+
+    Elimination on the correlations of many epochs at once, which is a Cholesky solve; where a pivot vanishes, or the matrix is
+    not semidefinite, the pseudo-inverse.
+    """
+    value, rank = np.empty(len(e)), np.empty(len(e), dtype=np.int64)
+    for start in range(0, len(e), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        value[part], rank[part] = _squared_in_sigmas(e[part], P[part], present[part])
+    return Consistency(value, rank)
+
+
+def _squared_in_sigmas(e: Array, P: Array, present: Array) -> tuple[Array, Array]:
+    n = e.shape[1]
+    both = present[:, :, None] & present[:, None, :]
+    # what is missing becomes an error of zero that is independent of the rest: it adds nothing to the sum
+    P = np.where(both, P, np.eye(n))
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        sigma = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
+        unit = np.where(sigma > 0, sigma, 1.0)
+        y = np.where(present, e, 0.0) / unit
+        C = P / (unit[:, :, None] * unit[:, None, :])
+        value, lowest = _eliminate(y, C)
+    finite = np.isfinite(y).all(axis=1) & np.isfinite(C).all(axis=(1, 2))
+    value[~finite] = np.nan
+    rank = present.sum(axis=1)
+    singular = np.flatnonzero(finite & ~(lowest > _tolerance(n)))
+    if singular.size:
+        value[singular], found = _pseudo_inverse(y[singular], C[singular])
+        rank[singular] += found - n
+    value[rank == 0] = np.nan
+    return value, rank
+
+
+def _tolerance(n: int) -> float:
+    """Pivots and eigenvalues of correlations at or below this are rounding errors."""
+    return 8 * n * float(np.finfo(float).eps)
+
+
+def _eliminate(y: Array, C: Array) -> tuple[Array, Array]:
+    """y^T C^-1 y and the smallest pivot; epochs last, so that every operation runs over all of them."""
+    y, C = np.ascontiguousarray(y.T), np.ascontiguousarray(np.moveaxis(C, 0, -1))
+    value, lowest = np.zeros(y.shape[1]), np.full(y.shape[1], np.inf)
+    for j in range(len(y)):
+        pivot = C[j, j]
+        lowest = np.minimum(lowest, pivot)
+        value += y[j] ** 2 / pivot
+        factor = C[j + 1 :, j] / pivot
+        y[j + 1 :] -= factor * y[j]
+        C[j + 1 :, j + 1 :] -= factor[:, None] * C[j, None, j + 1 :]
+    return value, lowest
+
+
+def _pseudo_inverse(y: Array, C: Array) -> tuple[Array, Array]:
+    """y^T C^+ y and the rank of C."""
+    values, vectors = np.linalg.eigh(C)
+    kept = values > _tolerance(C.shape[1]) * np.maximum(values[:, -1:], 0.0)
+    projected = np.einsum("kji,kj->ki", vectors, y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        terms = np.where(kept, projected**2 / np.where(kept, values, 1.0), 0.0)
+    return terms.sum(axis=1), kept.sum(axis=1)
+
+
+def has_diverged(estimate: Estimate) -> bool:
+    """Whether the estimate has left the truth and does not know it.
+
+    True where a mean is not finite.  Else only where, in the last half of the run (rows K//2 onward), both hold:
+
+    * its own covariance denies the error: the median NEES is beyond ten times the 99.9 % quantile of chi-square, far outside
+      what correlation in time or a mild nonlinearity explains;
+    * the error is not coming down: in no group of states is the RMS error of the last quarter less than half of that of the
+      quarter before.
+
+    Without truth, NIS and the innovations take the place of NEES and the errors.  Both kinds of divergence in Fitzgerald, IEEE
+    Trans. Automatic Control 16(6), 1971, are meant: errors that grow, and errors that stay far beyond their covariance.
+    """
+    if not np.isfinite(estimate.mean).all():
+        return True
+    error, consistency = errors(estimate), nees(estimate)
+    if error is not None and consistency is not None:
+        return _denied(consistency) and _persists(error, list(groups(estimate).values()))
+    return _denied(nis(estimate)) and _persists(estimate.innovations, [(i,) for i in range(estimate.innovations.shape[1])])
+
+
+def groups(estimate: Estimate) -> dict[str, tuple[int, ...]]:
+    """Columns of every group of states that the model names, or of every state where it names none."""
+    model = estimate.problem.model
+    return model.group_indices or {name: (i,) for i, name in enumerate(model.names)}
+
+
+def _denied(consistency: Consistency) -> bool:
+    half = slice(len(consistency.value) // 2, None)
+    known = consistency.rank[half] > 0
+    if not known.any():
+        return False
+    typical = np.median(consistency.rank[half][known])
+    return bool(np.median(consistency.value[half][known]) > _FAR * quantile(0.999, float(typical)))
+
+
+def _persists(error: Array, columns: Sequence[Sequence[int]]) -> bool:
+    """Whether in no group of columns the last quarter is less than half of the quarter before; False for a run too short."""
+    K = len(error)
+    sizes = []
+    for group in columns:
+        part = error[:, list(group)]
+        earlier, later = (_rms(q[~np.isnan(q).any(axis=1)]) for q in (part[K // 2 : 3 * K // 4], part[3 * K // 4 :]))
+        if earlier is not None and later is not None:
+            sizes.append((earlier, later))
+    return bool(sizes) and all(later >= 0.5 * earlier for earlier, later in sizes)

@@ -1,0 +1,81 @@
+"""Equations as text, safely: `names` and `check` read them without SymPy, `to_sympy` and `from_sympy` convert.
+
+The language is what a formula needs and no more (`parse.py` has the grammar): numbers, names, ``pi``, ``+ - * / **``
+and `FUNCTIONS`, with Python's precedence.  Text is never given to Python's or SymPy's own parsers, which execute it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING
+
+from piazzi.expressions.bounds import read
+from piazzi.expressions.errors import ExpressionError, quote, suggest
+from piazzi.expressions.language import CONSTANTS, FUNCTIONS
+from piazzi.expressions.numeric import evaluate
+from piazzi.expressions.parse import Parsed, is_name
+from piazzi.expressions.symbolic import build, symbol
+from piazzi.expressions.writing import write
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+__all__ = ["CONSTANTS", "FUNCTIONS", "ExpressionError", "check", "evaluate", "from_sympy", "is_name", "names", "symbol", "to_sympy"]
+
+
+def names(text: str) -> frozenset[str]:
+    """Return the free names of an equation.
+
+    Raises
+    ------
+    ExpressionError
+        If the text is outside the language, or one of its constants is undefined or too large.
+    """
+    return frozenset(read(text).names)
+
+
+def check(text: str, allowed: Collection[str]) -> frozenset[str]:
+    """Return the free names of an equation, each of them one of `allowed`.
+
+    Raises
+    ------
+    ExpressionError
+        As `names` does, and at the first name that is not allowed, with the nearest that is.
+    """
+    return frozenset(_read_with(text, allowed).names)
+
+
+def to_sympy(text: str, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
+    """Return the SymPy expression of an equation over `symbols` (see `symbol`).
+
+    Integers and their quotients are exact rationals; a decimal is a Float whose `float` is the double that was written.
+    SymPy simplifies as it always does, so 2*(x + y) comes back expanded and x - x as zero.
+
+    Raises
+    ------
+    ExpressionError
+        As `check` does, and where SymPy finds that a part has no finite real value.
+    """
+    return build(_read_with(text, symbols), symbols)
+
+
+def from_sympy(expr: object) -> str:
+    """Return the canonical equation of a SymPy expression or a Python number, such that `to_sympy` gives it back.
+
+    Equal expressions give equal text in every process, and doubles survive bit for bit.
+
+    Raises
+    ------
+    ExpressionError
+        If a part has no place in an equation (Piecewise, Derivative, a function of time, complex or infinite values, a
+        matrix ...), or the text would exceed the limits of the language.
+    """
+    return write(expr)
+
+
+def _read_with(text: str, allowed: Collection[str] | Mapping[str, object]) -> Parsed:
+    parsed = read(text)
+    for name, column in parsed.names.items():
+        if name not in allowed:
+            raise ExpressionError(f"unknown name {quote(name)}{suggest(name, [*allowed, *CONSTANTS])}", text, column)
+    return parsed

@@ -1,0 +1,278 @@
+"""The equation language: text to tokens to a small tree, with Python's meaning of every accepted text.
+
+    sum     = product (("+" | "-") product)*
+    product = signed (("*" | "/") signed)*
+    signed  = ("+" | "-") signed | power
+    power   = atom ("**" signed)?
+    atom    = number | name | function "(" sum ("," sum)* ")" | "(" sum ")"
+
+Nothing of Python's own machinery ever sees the text: no attribute, subscript, string, comparison or keyword has a rule
+here that could let it in.  A chain such as a + b - c is one node however long it is, so only brackets, signs and
+exponents nest, and what is accepted depends neither on the Python version nor on the caller's stack (`ast.parse` raises
+RecursionError for sums of about 2900 terms).
+"""
+
+from __future__ import annotations
+
+import keyword
+import math
+import re
+import unicodedata
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from piazzi.expressions.errors import ExpressionError, quote, suggest
+from piazzi.expressions.language import (
+    CONSTANTS,
+    FUNCTIONS,
+    MAX_DEPTH,
+    MAX_DIGITS,
+    MAX_EXTREMES,
+    MAX_LENGTH,
+    MAX_NAME,
+    VARIADIC,
+    Call,
+    Name,
+    Negative,
+    Node,
+    Number,
+    Power,
+    Product,
+    Sum,
+)
+
+HINTS = {
+    "^": "write ** for powers",
+    "=": "an equation is written as its right-hand side alone",
+    ".": "attributes are not allowed",
+    "[": "subscripts are not allowed",
+    "]": "subscripts are not allowed",
+    "'": "strings are not allowed",
+    '"': "strings are not allowed",
+    "<": "comparisons are not allowed",
+    ">": "comparisons are not allowed",
+}
+ALIASES = {"ln": "log", "sgn": "sign", "fabs": "abs", "pow": "**"}
+
+TOKEN = re.compile(
+    r"(?P<space>[ \t\r\n]+)|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+    r"|(?P<name>[^\W\d]\w*)|(?P<operator>\*\*|[-+*/(),])"
+)
+
+
+class Parsed(NamedTuple):
+    """An equation as a tree, and the column where each free name first stands."""
+
+    text: str
+    tree: Node
+    names: Mapping[str, int]
+
+
+class Token(NamedTuple):
+    """A piece of the text: its kind ("number", "name", "operator" or "end"), the piece, its column from 1."""
+
+    kind: str
+    piece: str
+    column: int
+
+
+def parse(text: str) -> Parsed:
+    """Return the tree of an equation; `ExpressionError` says what is outside the language, and where."""
+    if not isinstance(text, str):
+        raise ExpressionError(f"an equation must be text, not {type(text).__name__}", "")
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(f"the equation has {len(text)} characters; at most {MAX_LENGTH} are allowed", text, MAX_LENGTH + 1)
+    reader = _Reader(text)
+    try:
+        tree = reader.sum()
+    except RecursionError:  # only when the caller's own stack was all but used up
+        raise ExpressionError("the equation is nested too deep", text) from None
+    if reader.next.kind != "end":
+        raise reader.unexpected()
+    return Parsed(text, tree, MappingProxyType(reader.names))
+
+
+def is_name(text: str) -> bool:
+    """Return whether `text`, to the letter, can name a state, parameter or input."""
+    try:
+        tree = parse(text).tree
+    except ExpressionError:
+        return False
+    return isinstance(tree, Name) and tree.name == text and text not in CONSTANTS
+
+
+def _tokenize(text: str) -> list[Token]:
+    tokens, position = [], 0
+    while position < len(text):
+        match = TOKEN.match(text, position)
+        if match is None:
+            raise _bad_character(text, position)
+        token = Token(match.lastgroup or "", match.group(), position + 1)
+        if token.kind == "name":
+            _check_name(text, token)
+        if token.kind != "space":
+            tokens.append(token)
+        position = match.end()
+    return [*tokens, Token("end", "", len(text) + 1)]
+
+
+def _bad_character(text: str, position: int) -> ExpressionError:
+    character = text[position]
+    reason = HINTS.get(character, f"U+{ord(character):04X} is not part of the equation language")
+    return ExpressionError(f"{quote(character)}: {reason}", text, position + 1)
+
+
+def _check_name(text: str, token: Token) -> None:
+    name, problem = token.piece, ""
+    written_as = unicodedata.normalize("NFKC", name)
+    if len(name) > MAX_NAME:
+        problem = f"name {quote(name)} has {len(name)} characters; at most {MAX_NAME} are allowed"
+    elif name.startswith("_") or "__" in name:
+        problem = f"name {quote(name)}: a leading or double underscore is not allowed"
+    elif written_as != name:  # Python would read two different spellings as one name
+        problem = f"name {quote(name)} is a look-alike of {quote(written_as)}; write that"
+    elif not all(c == "_" or c.isalpha() or (c.isascii() and c.isdigit()) for c in name):
+        problem = f"name {quote(name)} may hold letters, digits 0-9 and underscores only"
+    elif keyword.iskeyword(name):
+        problem = f"{quote(name)} is a reserved word of Python"
+    if problem:
+        raise ExpressionError(problem, text, token.column)
+
+
+class _Reader:
+    """One pass over the tokens by recursive descent; recursion is bounded by `MAX_DEPTH`, chains are loops."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.tokens = iter(_tokenize(text))
+        self.next = next(self.tokens)
+        self.names: dict[str, int] = {}
+        self.depth = 0
+        self.extremes = 0
+
+    def take(self) -> Token:
+        token, self.next = self.next, next(self.tokens)
+        return token
+
+    def error(self, problem: str, token: Token) -> ExpressionError:
+        return ExpressionError(problem, self.text, token.column)
+
+    def unexpected(self) -> ExpressionError:
+        token = self.next
+        if token.kind == "end":
+            return self.error("the equation ends where a number, name or bracket should follow", token)
+        if token.kind in ("name", "number") or token.piece == "(":
+            return self.error(f"an operator is missing before {quote(token.piece)}; write * to multiply", token)
+        return self.error(f"{quote(token.piece)} is out of place", token)
+
+    def enter(self, token: Token) -> None:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise self.error(f"nested deeper than {MAX_DEPTH} brackets, signs and exponents", token)
+
+    def sum(self) -> Node:
+        column, terms = self.next.column, [(False, self.product())]
+        while self.next.piece in ("+", "-"):
+            terms.append((self.take().piece == "-", self.product()))
+        return terms[0][1] if len(terms) == 1 else Sum(tuple(terms), column)
+
+    def product(self) -> Node:
+        column, factors = self.next.column, [(False, self.signed())]
+        while self.next.piece in ("*", "/"):
+            factors.append((self.take().piece == "/", self.signed()))
+        return factors[0][1] if len(factors) == 1 else Product(tuple(factors), column)
+
+    def signed(self) -> Node:
+        if self.next.piece not in ("+", "-"):
+            return self.power()
+        sign = self.take()
+        self.enter(sign)
+        operand = self.signed()
+        self.depth -= 1
+        return Negative(operand, sign.column) if sign.piece == "-" else operand
+
+    def power(self) -> Node:
+        column, base = self.next.column, self.atom()
+        if self.next.piece != "**":
+            return base
+        self.enter(self.take())
+        exponent = self.signed()
+        self.depth -= 1
+        return Power(base, exponent, column)
+
+    def atom(self) -> Node:
+        if self.next.kind == "number":
+            return self.number(self.take())
+        if self.next.kind == "name":
+            token = self.take()
+            return self.call(token) if self.next.piece == "(" else self.name(token)
+        if self.next.piece == "(":
+            return self.bracket()[0]
+        if self.next.kind == "operator":
+            raise self.error(f"{quote(self.next.piece)} stands where a number, name or bracket should", self.next)
+        raise self.unexpected()
+
+    def bracket(self, *, many: bool = False) -> tuple[Node, ...]:
+        opening = self.take()
+        self.enter(opening)
+        empty = many and self.next.piece == ")"
+        inside = [] if empty else [self.sum()]
+        while many and self.next.piece == ",":
+            self.take()
+            inside.append(self.sum())
+        if self.next.kind == "end":
+            raise self.error("this bracket is never closed", opening)
+        if self.next.piece != ")":
+            raise self.unexpected()
+        self.take()
+        self.depth -= 1
+        return tuple(inside)
+
+    def number(self, token: Token) -> Number:
+        if self.next.kind in ("name", "number") and self.next.column == token.column + len(token.piece):
+            hint = "write * to multiply; numbers are plain decimals such as 12, 0.5 or 1e-3"
+            raise self.error(f"number {quote(token.piece)} runs into {quote(self.next.piece)}: {hint}", token)
+        return Number(self.value(token), token.column)
+
+    def value(self, token: Token) -> int | float:
+        literal = token.piece
+        if literal.isdigit():
+            if len(literal) > MAX_DIGITS:
+                raise self.error(f"integer of {len(literal)} digits; at most {MAX_DIGITS} are allowed", token)
+            if literal[0] == "0" and literal.strip("0"):
+                raise self.error(f"integer {quote(literal)} has a leading zero", token)
+            return int(literal)
+        value = float(literal)
+        if not math.isfinite(value):
+            raise self.error(f"number {quote(literal)} is too large for a double", token)
+        if value == 0.0 and literal.lower().split("e")[0].strip("0."):
+            raise self.error(f"number {quote(literal)} is too small for a double", token)
+        return value
+
+    def name(self, token: Token) -> Name:
+        if token.piece in FUNCTIONS:
+            raise self.error(f"{quote(token.piece)} is a function and needs its arguments in brackets", token)
+        if token.piece not in CONSTANTS:
+            self.names.setdefault(token.piece, token.column)
+        return Name(token.piece, token.column)
+
+    def call(self, token: Token) -> Call:
+        function = token.piece
+        if function not in FUNCTIONS:
+            hint = f"; write {quote(ALIASES[function])}" if function in ALIASES else suggest(function, FUNCTIONS)
+            raise self.error(f"{quote(function)} is not a function{hint or '; write * to multiply'}", token)
+        arguments = self.bracket(many=True)
+        self.check_count(token, len(arguments))
+        return Call(function, arguments, token.column)
+
+    def check_count(self, token: Token, got: int) -> None:
+        function, arity = token.piece, FUNCTIONS[token.piece]
+        if function in VARIADIC:
+            self.extremes += got
+            if self.extremes > MAX_EXTREMES:
+                raise self.error(f"min and max have more than {MAX_EXTREMES} arguments in all", token)
+        if got < arity or (got > arity and function not in VARIADIC):
+            or_more = " or more" if function in VARIADIC else ""
+            plural = "" if arity == 1 else "s"
+            raise self.error(f"{function} takes {arity}{or_more} argument{plural}, got {got}", token)

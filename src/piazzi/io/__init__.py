@@ -1,0 +1,1 @@
+"""Files of problems, measurements and estimates."""

@@ -1,0 +1,152 @@
+"""Where compiled kernels live between runs: a private folder, one sub-folder per specification, each with a checksum manifest."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import shutil
+import stat
+import tempfile
+import time
+import warnings
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from piazzi.kernels.build import compile_entries, entry_names, plain_entries
+from piazzi.kernels.library import load_objects
+from piazzi.kernels.spec import KernelSpec
+
+LOGGER = logging.getLogger("piazzi.kernels")
+MANIFEST = "manifest.json"
+_spent: list[float] = []
+_loaded: dict[tuple[KernelSpec, bool], SimpleNamespace] = {}
+
+
+def load(spec: KernelSpec) -> SimpleNamespace:
+    """The callable entries of a specification, as attributes: from memory, from disk, or built now.
+
+    A first build logs one line at level INFO on the logger ``piazzi.kernels``.
+    """
+    compiled = os.environ.get("PIAZZI_JIT", "1") != "0"
+    found = _loaded.get((spec, compiled))
+    if found is None:
+        started = time.perf_counter()
+        found = _loaded[spec, compiled] = _from_disk_or_built(spec) if compiled else _plain(spec)
+        _spent.append(time.perf_counter() - started)
+    return found
+
+
+def build_seconds() -> float:
+    """Seconds that this process has spent on loading and compiling kernels."""
+    return sum(_spent)
+
+
+def _plain(spec: KernelSpec) -> SimpleNamespace:
+    source = spec.source("plain")
+    with tempfile.TemporaryDirectory(prefix="piazzi-") as folder:
+        path = Path(folder) / "kernels.py"
+        path.write_text(source)
+        return SimpleNamespace(**plain_entries(path, entry_names(source)))
+
+
+def _from_disk_or_built(spec: KernelSpec) -> SimpleNamespace:
+    digest = spec.digest()
+    home = folder() / digest
+    entries = _read(home)
+    if entries is None:
+        LOGGER.info("compiling %s for %s, once (about 5 to 15 s) ...", " + ".join(spec.fragments[-1:]), ", ".join(spec.model.names))
+        started = time.perf_counter()
+        entries = _build(spec, home)
+        LOGGER.debug("compiled in %.1f s into %s", time.perf_counter() - started, home)
+    return SimpleNamespace(**entries)
+
+
+def _read(home: Path) -> dict[str, Any] | None:
+    """Entries of a finished folder, or None where something is missing, truncated or altered."""
+    try:
+        manifest = json.loads((home / MANIFEST).read_text())
+        objects = {}
+        for name, checksum in manifest["objects"].items():
+            objects[name] = (home / f"{name}.o").read_bytes()
+            if hashlib.sha256(objects[name]).hexdigest() != checksum:
+                return None
+        symbols = {name: (symbol, tuple(kinds)) for name, (symbol, kinds) in manifest["symbols"].items()}
+        if manifest["seal"] != _seal(manifest):
+            return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+    return dict(load_objects(objects, symbols))
+
+
+def _seal(manifest: dict[str, Any]) -> str:
+    """Checksum of the manifest itself: its symbols and kinds decide how the code is called."""
+    body = json.dumps([manifest["objects"], manifest["symbols"]], sort_keys=True)
+    return hashlib.sha256(body.encode()).hexdigest()
+
+
+def _build(spec: KernelSpec, home: Path) -> dict[str, Any]:
+    """Compile in a folder of our own, then move it into place: two processes may do so at once."""
+    source = spec.source("compiled")
+    work = Path(tempfile.mkdtemp(prefix=".building-", dir=home.parent))
+    try:
+        (work / "kernels.py").write_text(source)
+        objects, symbols = compile_entries(work / "kernels.py", entry_names(source))
+        for name, code in objects.items():
+            (work / f"{name}.o").write_bytes(code)
+        manifest: dict[str, Any] = {"objects": {n: hashlib.sha256(c).hexdigest() for n, c in objects.items()}, "symbols": symbols}
+        (work / MANIFEST).write_text(json.dumps(manifest | {"seal": _seal(json.loads(json.dumps(manifest)))}))
+        _move(work, home)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    return dict(load_objects(objects, symbols))
+
+
+def _move(work: Path, home: Path) -> None:
+    """Put a finished folder in its place; one that is damaged makes way, one that another process finished stays."""
+    for _ in range(3):
+        try:
+            os.rename(work, home)
+            return
+        except OSError:
+            if _read(home) is not None:
+                return
+            aside = Path(tempfile.mkdtemp(prefix=".damaged-", dir=home.parent))
+            try:
+                os.rename(home, aside / "old")
+            except OSError:
+                pass
+            shutil.rmtree(aside, ignore_errors=True)
+
+
+@cache
+def folder() -> Path:
+    """The private cache folder: PIAZZI_CACHE, else XDG_CACHE_HOME/piazzi, else ~/.cache/piazzi; else a temporary one, with one warning."""
+    named = os.environ.get("PIAZZI_CACHE")
+    try:
+        place = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "piazzi"
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        _check_private(place)
+        with tempfile.TemporaryFile(dir=place):
+            return place
+    except (OSError, RuntimeError) as error:
+        temporary = Path(tempfile.mkdtemp(prefix="piazzi-cache-"))
+        import atexit
+
+        atexit.register(shutil.rmtree, temporary, True)
+        warnings.warn(f"no private, writable folder for compiled kernels ({error}); compiling into a temporary one. Set PIAZZI_CACHE.", stacklevel=2)
+        return temporary
+
+
+def _check_private(place: Path) -> None:
+    """Raise unless the folder is ours alone: what is in it is executed."""
+    if not hasattr(os, "getuid"):
+        return
+    state = place.stat()
+    if state.st_uid != os.getuid():
+        raise OSError(f"{place} belongs to another user")
+    if stat.S_IMODE(state.st_mode) & 0o077:
+        os.chmod(place, 0o700)

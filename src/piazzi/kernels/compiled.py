@@ -1,0 +1,47 @@
+"""The vocabulary of the kernels as compiled by Numba.  Imported only while something is compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import acos, asin, atan, atan2, cos, cosh, exp, fabs, inf, isnan, log, nan, pi, pow, sin, sinh, sqrt, tan, tanh  # noqa: A004
+from typing import Any
+
+from numba import cfunc, njit, types
+
+from piazzi.kernels.lanes import (
+    heaviside,
+    identity,
+    load_lanes,
+    load_matrix,
+    load_vector,
+    matrix,
+    maximum,
+    minimum,
+    outer,
+    sign,
+    store,
+    store_lanes,
+    unit,
+    vector,
+)
+from piazzi.kernels.plain import wrap_angle as _wrap_angle
+
+# "contract" lets a*b + c round once; nothing else of fast-math, so that NaN keeps meaning "missing"
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+Array = types.CPointer(types.float64)
+Indices = types.CPointer(types.int64)
+_SCALARS = {int: types.int64, float: types.float64}
+
+
+def inline(function: Callable[..., Any]) -> Any:
+    """Mark a helper that disappears into its caller."""
+    return njit(forceinline=True, **OPTIONS)(function)
+
+
+def entry(function: Callable[..., Any]) -> Any:
+    """Compile a function that Python calls, with C's calling convention; its annotations are its types."""
+    kinds = [k for name, k in function.__annotations__.items() if name != "return"]
+    return cfunc(types.void(*(_SCALARS.get(k, k) for k in kinds)), **OPTIONS)(function)
+
+
+wrap_angle = inline(_wrap_angle)

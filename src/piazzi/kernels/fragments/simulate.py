@@ -1,0 +1,61 @@
+"""Draw a truth and its measurements: process noise is fed back into the state that is propagated and measured."""
+
+# ruff: noqa: F821
+from piazzi.kernels.vocabulary import *  # noqa: F403
+
+
+@inline
+def factor_in_place(L):
+    """Lower Cholesky factor of the semidefinite matrix in `L`; a direction without noise gets a zero column."""
+    largest = 0.0
+    for i in range(N):
+        largest = maximum(largest, L[i * N + i])
+    for j in range(N):
+        pivot = L[j * N + j]
+        for k in range(j):
+            pivot = pivot - L[j * N + k] * L[j * N + k]
+        pivot = sqrt(pivot) if pivot > 1e-14 * largest else 0.0
+        L[j * N + j] = pivot
+        for i in range(j + 1, N):
+            s = L[i * N + j]
+            for k in range(j):
+                s = s - L[i * N + k] * L[j * N + k]
+            L[i * N + j] = s / pivot if pivot > 0.0 else 0.0
+            L[j * N + i] = 0.0
+
+
+@entry
+def run_simulation(
+    K: int,
+    t: Array,
+    t_prior: float,
+    count: Indices,
+    scale: Array,
+    first_row: Indices,
+    station: Indices,
+    sensor: Indices,
+    numbers: Array,
+    p: Array,
+    Q: Array,
+    x0: Array,
+    w: Array,
+    L: Array,
+    truth: Array,
+    z: Array,
+) -> None:
+    x = load_vector(x0, 0, N)
+    Q_unit = load_matrix(Q, 0, N, N)
+    before = t_prior
+    for k in range(K):
+        if t[k] > before:
+            start = x
+            x = travel(before, t[k] - before, count[k], start, p)
+            _, _, Q_step = advance(before, t[k] - before, count[k], start, p, Q_unit, scale[k])
+            store(L, 0, Q_step)
+            factor_in_place(L)
+            x = x + load_matrix(L, 0, N, N) @ load_vector(w, k * N, N)
+        before = t[k]
+        store(truth, k * N, x)
+        for row in range(first_row[k], first_row[k + 1]):
+            s = station[row]
+            measure_into(sensor[s], t[k], x, p, numbers, s * NUMBERS, z, row * M)

@@ -1,0 +1,25 @@
+"""Measurement update one component at a time; a full R is decorrelated first."""
+
+# ruff: noqa: F821
+from piazzi.kernels.vocabulary import *  # noqa: F403
+
+
+@inline
+def absorb(d, P, nu, H, R, at, correlated, work):
+    """Correction `d` of the predicted state and covariance after one row of measurements, linearised where `nu`, `H` were.
+
+    Joseph form for a scalar: with B = P (I - K H)^T, P' = (I - K H) B + K r K^T = B + K (r K - H B)^T.
+    """
+    if correlated:
+        decorrelate(nu, H, 0, R, at, work)
+    for i in range(M):
+        if not isnan(nu[i]):
+            r = 1.0 if correlated else R[at + i * M + i]
+            h = load_vector(H, i * N, N)
+            Ph = h @ P
+            S = h @ Ph + r
+            K = (1.0 / S) * Ph
+            d = d + (nu[i] - h @ d) * K
+            B = P - outer(Ph, K)
+            P = B + outer(K, r * K - h @ B)
+    return d, P

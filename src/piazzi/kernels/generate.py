@@ -1,0 +1,178 @@
+"""A model's equations -> the source of its functions, specialised for its sizes.  Needs SymPy; runs only when nothing is cached.
+
+The functions written here (sizes: `ND` states, `N` values with the estimated constants, `M` components of the widest sensor):
+
+* ``dynamics(t, x, p)``, ``rhs(t, x, R, p)``: dx/dt, and with it dR/dt = F R for the first `ND` rows of a transition matrix
+* ``substep(t, h, x, p)``, ``substep_jacobian(t, h, x, R, p)``: one step of the integrator, and the product of its derivative with R
+* ``first_rows()``, ``complete(R)``: the rows of the identity to start from; R with the constants' rows below it
+* ``measure_into(sensor, t, x, p, s, at, out, row)``, ``innovate(sensor, t, x, p, s, at, z, row, nu, H, out)``: h; z - h wrapped, and H
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from piazzi.kernels.printer import function
+from piazzi.model import Model
+from piazzi.model.derivation import constant_acceleration_step, derive, derive_sensor, jacobian
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+
+def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
+    """Source of the sizes, dynamics, step and sensors; `lanes` problems are worked on at once where there are that many."""
+    sizes = {"LANES": lanes, "ND": len(model.states), "N": model.n, "M": model.width, "NUMBERS": max([len(model.numbers(s)) for s in model.sensors] + [1])}
+    parts = ["".join(f"{k} = {v}\n" for k, v in sizes.items()), "\n\n", _identity_source(model)]
+    if not model.discrete:
+        parts.append(_dynamics_source(model))
+    parts.append(_step_source(model, scheme))
+    parts.append(_sensor_source(model))
+    return "".join(parts)
+
+
+def _arguments(model: Model, extra: Sequence[str] = ()) -> tuple[list[str], dict[sp.Symbol, str], str]:
+    """Argument names, the symbols they stand for, and the call from the vectors `x` and `p`."""
+    d = derive(model)
+    names = {s: f"x{i}" for i, s in enumerate(d.x)} | {s: f"p{i}" for i, s in enumerate(d.p)} | {d.t: "t"}
+    arguments = ["t", *extra, *(f"x{i}" for i in range(len(d.x))), *(f"p{i}" for i in range(len(d.p)))]
+    call = ", ".join(["t", *extra, *(f"x[{i}]" for i in range(len(d.x))), *(f"p[{i}]" for i in range(len(d.p)))])
+    return arguments, names, call
+
+
+def _inline(head: str, *lines: str) -> str:
+    return f"@inline\ndef {head}:\n" + "".join(f"    {line}\n" for line in lines) + "\n\n"
+
+
+def _identity_source(model: Model) -> str:
+    nd, n = len(model.states), model.n
+    top = ", ".join(f"unit({i}, {n})" for i in range(nd))
+    rest = "".join(f", unit({i}, {n})" for i in range(nd, n))
+    full = "R" if nd == n else "matrix(" + ", ".join(f"R[{i}]" for i in range(nd)) + rest + ")"
+    return _inline("first_rows()", f"return matrix({top})") + _inline("complete(R)", f"return {full}")
+
+
+class _Jacobian:
+    """A Jacobian's entries: those that vary are outputs of the scalar function, the rest are literals in the source."""
+
+    def __init__(self, matrix: sp.Matrix, prefix: str) -> None:
+        self.matrix, self.prefix = matrix, prefix
+        self.varying = [(i, j) for i in range(matrix.rows) for j in range(matrix.cols) if matrix[i, j].free_symbols]
+        self.outputs = [matrix[i, j] for i, j in self.varying]
+        self.names = [f"{prefix}{i}_{j}" for i, j in self.varying]
+
+    def entry(self, i: int, j: int) -> str:
+        """Text of an entry, "" where it is zero."""
+        value = self.matrix[i, j]
+        if value == 0:
+            return ""
+        return f"{self.prefix}{i}_{j}" if value.free_symbols else repr(float(value))
+
+    def row_times(self, i: int, rows: Sequence[str], width: int) -> str:
+        """Row i of the product with the matrix of those rows."""
+        terms = []
+        for j, row in enumerate(rows):
+            e = self.entry(i, j)
+            if e:
+                terms.append(row if e == "1.0" else f"{e}*{row}")
+        return " + ".join(terms) if terms else f"unit(-1, {width})"
+
+    def dense_row(self, i: int) -> str:
+        return "vector(" + ", ".join(self.entry(i, j) or "0.0" for j in range(self.matrix.cols)) + ")"
+
+
+def _rows(model: Model) -> list[str]:
+    """Text of the rows that a Jacobian multiplies: those of R, then the constants' unit rows."""
+    nd, n = len(model.states), model.n
+    return [f"R[{i}]" for i in range(nd)] + [f"unit({i}, {n})" for i in range(nd, n)]
+
+
+def _unpack(names: Sequence[str], call: str) -> str:
+    return f"({', '.join(names)},) = {call}"
+
+
+def _dynamics_source(model: Model) -> str:
+    d, (arguments, names, call) = derive(model), _arguments(model)
+    nd, n = len(model.states), model.n
+    F = _Jacobian(d.F, "F")
+    rates = [f"f{i}" for i in range(nd)]
+    whole = f"vector({', '.join(rates + ['0.0'] * (n - nd))})"
+    rows = ", ".join(F.row_times(i, _rows(model), n) for i in range(nd))
+    return (
+        function("scalar_f", arguments, names, list(d.f))
+        + function("scalar_f_F", arguments, names, list(d.f) + F.outputs)
+        + _inline("dynamics(t, x, p)", _unpack(rates, f"scalar_f({call})"), f"return {whole}")
+        + _inline("rhs(t, x, R, p)", _unpack(rates + F.names, f"scalar_f_F({call})"), f"return {whole}, matrix({rows})")
+    )
+
+
+def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
+    if scheme[0] == "runge-kutta":
+        return _runge_kutta_source(*scheme[1])
+    if scheme[0] == "taylor":
+        nxt, h = constant_acceleration_step(model)
+    else:
+        nxt, h = tuple(derive(model).f), derive(model).dt
+    return _map_source(model, nxt, h)
+
+
+def _map_source(model: Model, nxt: Sequence[sp.Expr], h: sp.Symbol) -> str:
+    """A step given as a formula: its Jacobian is derived."""
+    import sympy as sp
+
+    arguments, names, call = _arguments(model, ("h",))
+    names = {**names, h: "h"}
+    nd, n = len(model.states), model.n
+    G = _Jacobian(jacobian(sp.Matrix(list(nxt)), derive(model).x), "G")
+    results = [f"n{i}" for i in range(nd)]
+    whole = f"vector({', '.join(results + [f'x[{i}]' for i in range(nd, n)])})"
+    rows = ", ".join(G.row_times(i, _rows(model), n) for i in range(nd))
+    return (
+        function("scalar_step", arguments, names, list(nxt))
+        + function("scalar_step_G", arguments, names, list(nxt) + G.outputs)
+        + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
+        + _inline("substep_jacobian(t, h, x, R, p)", _unpack(results + G.names, f"scalar_step_G({call})"), f"return {whole}, matrix({rows})")
+    )
+
+
+def _runge_kutta_source(a: Sequence[Sequence[float]], weights: Sequence[float], nodes: Sequence[float]) -> str:
+    """The stages of an explicit tableau, on the state alone and on state and transition matrix together."""
+
+    def stage(base: str, k: str, coefficients: Sequence[float]) -> str:
+        terms = [f"({c!r}*h)*{k}{j}" for j, c in enumerate(coefficients) if c]
+        return " + ".join([base, *terms])
+
+    alone, both = [], []
+    for i, (row, c) in enumerate(zip(a, nodes, strict=True)):
+        t = f"t + {c!r}*h" if c else "t"
+        alone.append(f"k{i} = dynamics({t}, {stage('x', 'k', row)}, p)")
+        both.append(f"k{i}, K{i} = rhs({t}, {stage('x', 'k', row)}, {stage('R', 'K', row)}, p)")
+    alone.append(f"return {stage('x', 'k', weights)}")
+    both.append(f"return {stage('x', 'k', weights)}, {stage('R', 'K', weights)}")
+    return _inline("substep(t, h, x, p)", *alone) + _inline("substep_jacobian(t, h, x, R, p)", *both)
+
+
+def _sensor_source(model: Model) -> str:
+    functions, measure, innovate = [], [], []
+    for index, sensor in enumerate(model.sensors):
+        h, H, own = derive_sensor(model, sensor)
+        arguments, names, call = _arguments(model)
+        arguments += [f"s{i}" for i in range(len(own))]
+        names |= {s: f"s{i}" for i, s in enumerate(own)}
+        call += "".join(f", s[at + {i}]" for i in range(len(own)))
+        J = _Jacobian(H, "H")
+        seen = [f"h{i}" for i in range(sensor.width)]
+        functions += [function(f"scalar_h{index}", arguments, names, list(h)), function(f"scalar_h{index}_H", arguments, names, list(h) + J.outputs)]
+        guard = f"if sensor == {index}:" if len(model.sensors) > 1 else "if True:"
+        measure += [guard, "    " + _unpack(seen, f"scalar_h{index}({call})")]
+        measure += [f"    out[row + {i}] = " + (f"h{i}" if i < sensor.width else "nan") for i in range(model.width)]
+        innovate += [guard, "    " + _unpack(seen + J.names, f"scalar_h{index}_H({call})")]
+        for i, angle in enumerate(sensor.is_angle):
+            difference = f"z[row + {i}] - h{i}"
+            innovate.append(f"    nu[out + {i}] = " + (f"wrap_angle({difference})" if angle else difference))
+            innovate.append(f"    store(H, (out + {i}) * {model.n}, {J.dense_row(i)})")
+        innovate += [f"    nu[out + {i}] = nan" for i in range(sensor.width, model.width)]
+    if not model.sensors:
+        measure, innovate = ["pass"], ["pass"]
+    return "".join(functions) + _inline("measure_into(sensor, t, x, p, s, at, out, row)", *measure) + _inline("innovate(sensor, t, x, p, s, at, z, row, nu, H, out)", *innovate)

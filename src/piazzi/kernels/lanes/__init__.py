@@ -1,0 +1,38 @@
+"""Small vectors and matrices in SIMD registers, for Numba."""
+
+from piazzi.kernels.lanes import operators as _operators
+from piazzi.kernels.lanes.functions import heaviside, maximum, minimum, sign
+from piazzi.kernels.lanes.kinds import Matrix, Pack, Vector, element
+from piazzi.kernels.lanes.memory import (
+    identity,
+    load_lanes,
+    load_matrix,
+    load_vector,
+    matrix,
+    outer,
+    store,
+    store_lanes,
+    unit,
+    vector,
+)
+
+__all__ = [
+    "Matrix",
+    "Pack",
+    "Vector",
+    "element",
+    "heaviside",
+    "identity",
+    "load_lanes",
+    "load_matrix",
+    "load_vector",
+    "matrix",
+    "maximum",
+    "minimum",
+    "outer",
+    "sign",
+    "store",
+    "store_lanes",
+    "unit",
+    "vector",
+]

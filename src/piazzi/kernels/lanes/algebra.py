@@ -1,0 +1,116 @@
+"""The algebra of vectors and matrices as LLVM instructions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from llvmlite import ir
+from numba.core import types
+
+from piazzi.kernels.lanes.kinds import DOUBLE, FUSE, INDEX, Matrix, Pack, Vector, element, llvm_type
+
+# `b` is the IR builder throughout; values are LLVM values of the types above.
+
+
+def splat(b: Any, x: Any, width: int) -> Any:
+    """`width` copies of the double `x`."""
+    vector = ir.VectorType(DOUBLE, width)
+    first = b.insert_element(ir.Constant(vector, ir.Undefined), x, ir.Constant(INDEX, 0))
+    return b.shuffle_vector(first, ir.Constant(vector, ir.Undefined), ir.Constant(ir.VectorType(INDEX, width), [0] * width))
+
+
+def get(b: Any, v: Any, i: int) -> Any:
+    """Entry `i` of a vector, row `i` of a matrix."""
+    if isinstance(v.type, ir.VectorType):
+        return b.extract_element(v, ir.Constant(INDEX, i))
+    return b.extract_value(v, i)
+
+
+def join(b: Any, ty: types.Type, parts: Sequence[Any]) -> Any:
+    """The vector of these entries, or the matrix of these rows."""
+    out = ir.Constant(llvm_type(ty), ir.Undefined)
+    for i, part in enumerate(parts):
+        if isinstance(out.type, ir.VectorType):
+            out = b.insert_element(out, part, ir.Constant(INDEX, i))
+        else:
+            out = b.insert_value(out, part, i)
+    return out
+
+
+def parts(b: Any, v: Any) -> list[Any]:
+    return [get(b, v, i) for i in range(v.type.count)]
+
+
+def zipped(b: Any, op: Callable[..., Any], *args: Any) -> Any:
+    """`op` on every entry; an array of registers is taken apart, a single register is not."""
+    if not isinstance(args[0].type, ir.ArrayType):
+        return op(*args)
+    out = ir.Constant(args[0].type, ir.Undefined)
+    for i in range(args[0].type.count):
+        out = b.insert_value(out, zipped(b, op, *(b.extract_value(a, i) for a in args)), i)
+    return out
+
+
+def widen(b: Any, have: types.Type, want: types.Type, v: Any) -> Any:
+    """A value of one problem as the same value in every lane; anything else unchanged."""
+    if have == want or not isinstance(want, (Pack, Vector, Matrix)):
+        return v
+    if isinstance(want, Pack):
+        return v if isinstance(have, Pack) else splat(b, v, want.w)
+    inner = element(want.w) if isinstance(want, Vector) else want.row
+    kind = element(have.w) if isinstance(want, Vector) else have.row
+    return join(b, want, [widen(b, kind, inner, part) for part in parts(b, v)])
+
+
+def add(b: Any, x: Any, y: Any) -> Any:
+    return zipped(b, lambda u, v: b.fadd(u, v, flags=FUSE), x, y)
+
+
+def sub(b: Any, x: Any, y: Any) -> Any:
+    return zipped(b, lambda u, v: b.fsub(u, v, flags=FUSE), x, y)
+
+
+def scale(b: Any, s: Any, x: Any) -> Any:
+    """The element `s` times everything in `x`."""
+
+    def times(register: Any) -> Any:
+        factor = s if s.type == register.type else splat(b, s, register.type.count)
+        return b.fmul(factor, register, flags=FUSE)
+
+    return zipped(b, times, x)
+
+
+def combine(b: Any, coefficients: Sequence[Any], rows: Sequence[Any]) -> Any:
+    """sum of coefficient * row."""
+    total = scale(b, coefficients[0], rows[0])
+    for c, row in zip(coefficients[1:], rows[1:], strict=True):
+        total = add(b, total, scale(b, c, row))
+    return total
+
+
+def transpose(b: Any, ty: Matrix, a: Any) -> Any:
+    rows = [parts(b, row) for row in parts(b, a)] if ty.w > 1 or max(ty.r, ty.n) > 8 else None
+    target = Matrix(ty.n, ty.r, ty.w)
+    if rows is not None:
+        return join(b, target, [join(b, target.row, [rows[i][j] for i in range(ty.r)]) for j in range(ty.n)])
+    return join(b, target, _transpose_by_shuffles(b, parts(b, a), ty.n))
+
+
+def _transpose_by_shuffles(b: Any, rows: list[Any], n: int) -> list[Any]:
+    """Transpose of registers: log2 rounds of interleaving, each of which doubles the length of the finished runs."""
+    r = len(rows)
+    size = 1 << (max(r, n) - 1).bit_length()
+    undefined = ir.Constant(ir.VectorType(DOUBLE, n), ir.Undefined)
+
+    def shuffle(x: Any, y: Any, mask: list[int]) -> Any:
+        return b.shuffle_vector(x, y, ir.Constant(ir.VectorType(INDEX, len(mask)), mask))
+
+    widen = list(range(n)) + [0] * (size - n)
+    work = [shuffle(rows[i] if i < r else undefined, undefined, widen) for i in range(size)]
+    low = [k // 2 + (k % 2) * size for k in range(size)]
+    high = [k + size // 2 for k in low]
+    for _ in range(size.bit_length() - 1):  # a perfect shuffle of the whole square, log2(size) times, transposes it
+        half = size // 2
+        work = [shuffle(work[i // 2], work[i // 2 + half], low if i % 2 == 0 else high) for i in range(size)]
+    return [shuffle(work[j], work[j], list(range(r))) for j in range(n)]

@@ -1,0 +1,159 @@
+"""Making vectors and matrices, and moving them between registers and arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic
+
+from piazzi.kernels.lanes.algebra import get, join, parts, scale, widen
+from piazzi.kernels.lanes.kinds import DOUBLE, Matrix, Vector, element, llvm_type
+
+
+@intrinsic
+def vector(typing: Any, *entries: Any) -> Any:
+    """The vector of these entries."""
+    kinds = entries[0] if len(entries) == 1 and isinstance(entries[0], types.BaseTuple) else entries
+    w = max(getattr(kind, "w", 1) for kind in kinds)
+    result, want = Vector(len(kinds), w), element(w)
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        values = [get(b, args[0], i) for i in range(len(kinds))]
+        values = [context.cast(b, v, k, types.float64) if isinstance(k, types.Number) else v for v, k in zip(values, kinds, strict=True)]
+        return join(b, result, [widen(b, k, want, v) for v, k in zip(values, kinds, strict=True)])
+
+    return result(types.StarArgTuple(kinds)), lower
+
+
+@intrinsic
+def matrix(typing: Any, *rows: Any) -> Any:
+    """The matrix of these rows."""
+    result = Matrix(len(rows), rows[0].n, max(row.w for row in rows))
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        return join(b, result, [widen(b, row, result.row, get(b, args[0], i)) for i, row in enumerate(rows)])
+
+    return result(types.StarArgTuple(rows)), lower
+
+
+@intrinsic
+def outer(typing: Any, u: Any, v: Any) -> Any:
+    """The matrix u v^T."""
+    result = Matrix(u.n, v.n, v.w)
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        return join(b, result, [scale(b, s, args[1]) for s in parts(b, args[0])])
+
+    return result(u, v), lower
+
+
+@intrinsic(prefer_literal=True)
+def unit(typing: Any, i: Any, n: Any) -> Any:
+    """Row `i` of the identity of size `n` (all zero where `i` is negative)."""
+    values = [1.0 if j == i.literal_value else 0.0 for j in range(n.literal_value)]
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        return ir.Constant(ir.VectorType(DOUBLE, len(values)), values)
+
+    return Vector(len(values))(i, n), lower
+
+
+@intrinsic(prefer_literal=True)
+def identity(typing: Any, n: Any) -> Any:
+    """The identity of size `n`."""
+    size = n.literal_value
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        row = ir.VectorType(DOUBLE, size)
+        return join(b, result, [ir.Constant(row, [1.0 if i == j else 0.0 for j in range(size)]) for i in range(size)])
+
+    result = Matrix(size, size)
+    return result(n), lower
+
+
+def _pointer(b: Any, base: Any, at: Any, register: Any) -> Any:
+    return b.bitcast(b.gep(base, [at]), register.as_pointer())
+
+
+@intrinsic(prefer_literal=True)
+def load_vector(typing: Any, a: Any, at: Any, n: Any) -> Any:
+    """The `n` numbers of the flat array `a` from position `at`."""
+    result = Vector(n.literal_value)
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        value = b.load(_pointer(b, args[0], args[1], llvm_type(result)))
+        value.align = 8
+        return value
+
+    return result(a, types.intp, n), lower
+
+
+@intrinsic(prefer_literal=True)
+def load_matrix(typing: Any, a: Any, at: Any, r: Any, n: Any) -> Any:
+    """The `r` rows of `n` numbers of the flat array `a` from position `at`."""
+    result = Matrix(r.literal_value, n.literal_value)
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        rows = []
+        for i in range(result.r):
+            start = b.add(args[1], ir.Constant(args[1].type, i * result.n))
+            rows.append(b.load(_pointer(b, args[0], start, llvm_type(result.row))))
+            rows[-1].align = 8
+        return join(b, result, rows)
+
+    return result(a, types.intp, r, n), lower
+
+
+@intrinsic
+def store(typing: Any, a: Any, at: Any, value: Any) -> Any:
+    """Write a vector, or a matrix row by row, into the flat array `a` from position `at`."""
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        rows = [args[2]] if isinstance(value, Vector) else parts(b, args[2])
+        for i, row in enumerate(rows):
+            start = b.add(args[1], ir.Constant(args[1].type, i * value.n))
+            b.store(row, _pointer(b, args[0], start, row.type)).align = 8
+        return context.get_dummy_value()
+
+    return types.void(a, types.intp, value), lower
+
+
+def _lane_positions(b: Any, at: Any, stride: Any, w: int, offset: int) -> list[Any]:
+    """Positions of entry `offset` in the records that start at `at`, `at + stride`, ..."""
+    first = b.add(at, ir.Constant(at.type, offset))
+    return [b.add(first, b.mul(stride, ir.Constant(at.type, lane))) for lane in range(w)]
+
+
+@intrinsic(prefer_literal=True)
+def load_lanes(typing: Any, a: Any, at: Any, n: Any, stride: Any, w: Any) -> Any:
+    """The vectors of `n` numbers at `at`, `at + stride`, ..., one to a lane."""
+    result = Vector(n.literal_value, w.literal_value)
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        packs = []
+        for i in range(result.n):
+            places = _lane_positions(b, args[1], args[3], result.w, i)
+            values = [b.load(b.gep(args[0], [place])) for place in places]
+            packs.append(join(b, element(result.w), values) if result.w > 1 else values[0])
+        return join(b, result, packs)
+
+    return result(a, types.intp, n, types.intp, w), lower
+
+
+@intrinsic
+def store_lanes(typing: Any, a: Any, at: Any, stride: Any, value: Any) -> Any:
+    """Write each lane's vector or matrix from position `at`, `at + stride`, ..."""
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        rows = [args[3]] if isinstance(value, Vector) else parts(b, args[3])
+        for i, row in enumerate(rows):
+            for j, pack in enumerate(parts(b, row)):
+                places = _lane_positions(b, args[1], args[2], value.w, i * value.n + j)
+                lanes = parts(b, pack) if value.w > 1 else [pack]
+                for place, lane in zip(places, lanes, strict=True):
+                    b.store(lane, b.gep(args[0], [place]))
+        return context.get_dummy_value()
+
+    return types.void(a, types.intp, types.intp, value), lower

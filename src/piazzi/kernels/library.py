@@ -1,0 +1,83 @@
+"""Compiled object code -> functions that Python calls.  Needs llvmlite only: no Numba, no unpickling, no linker."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+POINTER, INTEGER, REAL = "pointer", "integer", "real"
+_C_TYPES = {POINTER: ctypes.c_void_p, INTEGER: ctypes.c_int64, REAL: ctypes.c_double}
+# Numba's wrapper mentions these for its error path, which kernels never take: they raise nothing
+_NEVER_CALLED = ("numba_gil_ensure", "numba_gil_release", "NRT_MemInfo_call_dtor", "numba_unpickle")
+
+
+class Entry:
+    """A compiled function.  Arrays are passed by address: they must be contiguous float64 or int64, which is checked."""
+
+    def __init__(self, address: int, kinds: tuple[str, ...], keep: Any) -> None:
+        self._call = ctypes.CFUNCTYPE(None, *(_C_TYPES[k] for k in kinds))(address)
+        self._keep = keep  # the code lives as long as something can call it
+
+    def __call__(self, *args: Any) -> None:
+        self._call(*[_address(a) if isinstance(a, np.ndarray) else a for a in args])
+
+    def bind(self, *args: Any) -> Callable[[], None]:
+        """The call with these arguments, for repeating: arrays are looked up once, and read and written where they are."""
+        ready = [_address(a) if isinstance(a, np.ndarray) else a for a in args]
+
+        def again(call: Any = self._call, keep: Any = (args, self._keep)) -> None:
+            call(*ready)
+
+        return again
+
+
+def _address(a: np.ndarray[Any, Any]) -> int:
+    if not a.flags.c_contiguous or a.dtype.char not in "dlq":
+        raise TypeError(f"a kernel needs contiguous float64 or int64, not {a.dtype} with strides {a.strides}")
+    return a.ctypes.data
+
+
+class PlainEntry:
+    """The same function uncompiled: arrays are seen as flat ones."""
+
+    def __init__(self, function: Callable[..., None]) -> None:
+        self._function = function
+
+    def __call__(self, *args: Any) -> None:
+        with np.errstate(all="ignore"):
+            self._function(*[a.reshape(-1) if isinstance(a, np.ndarray) else a for a in args])
+
+    def bind(self, *args: Any) -> Callable[[], None]:
+        """The call with these arguments, for repeating."""
+        return lambda: self(*args)
+
+
+@cache
+def _machine() -> Any:
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    anywhere = ctypes.cast(ctypes.pythonapi.Py_IsInitialized, ctypes.c_void_p).value
+    for name in _NEVER_CALLED:
+        if llvm.address_of_symbol(name) is None:
+            llvm.add_symbol(name, anywhere)
+    return llvm.Target.from_default_triple().create_target_machine()
+
+
+def load_objects(objects: Mapping[str, bytes], symbols: Mapping[str, tuple[str, tuple[str, ...]]]) -> dict[str, Entry]:
+    """Entries by name from object files and, for each, its symbol and the kinds of its arguments."""
+    import llvmlite.binding as llvm
+
+    entries = {}
+    for name, code in objects.items():
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        symbol, kinds = symbols[name]
+        entries[name] = Entry(engine.get_function_address(symbol), kinds, engine)
+    return entries

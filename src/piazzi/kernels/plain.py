@@ -1,0 +1,97 @@
+"""The vocabulary of the kernels on NumPy arrays: the generated source runs on it uncompiled (`PIAZZI_JIT=0`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import acos, asin, atan, atan2, cos, cosh, exp, fabs, inf, isnan, log, nan, pi, pow, sin, sinh, sqrt, tan, tanh  # noqa: A004
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+Indices = np.ndarray[Any, Any]
+
+
+def inline(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Mark a helper that disappears into its caller."""
+    return function
+
+
+def entry(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Mark a function that Python calls."""
+    return function
+
+
+def vector(*entries: float) -> Array:
+    """The vector of these entries."""
+    return np.array(entries, dtype=float)
+
+
+def matrix(*rows: Array) -> Array:
+    """The matrix of these rows."""
+    return np.array(rows, dtype=float)
+
+
+def outer(u: Array, v: Array) -> Array:
+    """The matrix u v^T."""
+    return np.outer(u, v)
+
+
+def unit(i: int, n: int) -> Array:
+    """Row `i` of the identity of size `n`, all zero where `i` is negative."""
+    return np.array([1.0 if j == i else 0.0 for j in range(n)])
+
+
+def identity(n: int) -> Array:
+    """The identity of size `n`."""
+    return np.eye(n)
+
+
+def load_vector(a: Array, at: int, n: int) -> Array:
+    """The `n` numbers of the flat array `a` from position `at`."""
+    return a[at : at + n].copy()
+
+
+def load_matrix(a: Array, at: int, r: int, n: int) -> Array:
+    """The `r` rows of `n` numbers of the flat array `a` from position `at`."""
+    return a[at : at + r * n].reshape(r, n).copy()
+
+
+def store(a: Array, at: int, value: Array) -> None:
+    """Write a vector, or a matrix row by row, into the flat array `a` from position `at`."""
+    a[at : at + value.size] = value.reshape(-1)
+
+
+def load_lanes(a: Array, at: int, n: int, stride: int, w: int) -> Array:
+    """The vector of `n` numbers at `at`: uncompiled code works on one problem at a time."""
+    return load_vector(a, at, n)
+
+
+def store_lanes(a: Array, at: int, stride: int, value: Array) -> None:
+    """Write a vector or matrix from position `at`."""
+    store(a, at, value)
+
+
+def sign(x: float) -> float:
+    """-1, 0 or 1."""
+    return (x > 0.0) * 1.0 - (x < 0.0) * 1.0
+
+
+def heaviside(x: float) -> float:
+    """1 above zero, 0 below, 1/2 at zero: the derivative of max(x, 0)."""
+    return 0.5 + 0.5 * sign(x)
+
+
+def maximum(x: float, y: float) -> float:
+    """The larger one."""
+    return y if y > x else x
+
+
+def minimum(x: float, y: float) -> float:
+    """The smaller one."""
+    return y if y < x else x
+
+
+def wrap_angle(a: float) -> float:
+    """The same angle in (-pi, pi]."""
+    return a - 2.0 * pi * np.ceil((a - pi) / (2.0 * pi))

@@ -1,0 +1,157 @@
+"""SymPy expressions -> Python source over scalars, shaped for the compiler.
+
+Common subexpressions are taken out once over all outputs together.  Powers by integers and halves become products of a
+square root, a reciprocal and the base: ``pow`` is an order of magnitude slower and differs between maths libraries.
+The source has no branches, so the same text serves floats and vector lanes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+CALLS = {
+    **{name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sign")},
+    "Abs": "fabs",
+    "Heaviside": "heaviside",
+}
+
+
+_SLOW = 4  # cycles of a root, a quotient or a function, in multiplications
+
+
+class _Writer:
+    """Statements of one function body; `temporaries` maps the text of a root, reciprocal or product to its name.
+
+    Sums and products are written with what is known earliest first, so that only one operation waits for the slowest term:
+    along an orbit the next substep cannot start before this one's position is there.
+    """
+
+    def __init__(self, names: Mapping[sp.Symbol, str]) -> None:
+        self.names = dict(names)
+        self.depths: dict[sp.Symbol, int] = {}
+        self.lines: list[str] = []
+        self.temporaries: dict[str, str] = {}
+
+    def name(self, symbol: sp.Symbol, name: str, value: sp.Expr) -> None:
+        """Assign a shared subexpression."""
+        text = self.text(value)
+        self.lines.append(f"{name} = {text}")
+        self.depths[symbol] = self.depth(value)
+        self.names[symbol] = name
+
+    def depth(self, e: sp.Expr) -> int:
+        """Roughly how many operations come before the value of `e` is known."""
+        if not e.args:
+            return self.depths.get(e, 0)
+        slow = e.is_Function or (e.is_Pow and not (e.exp.is_Integer and e.exp > 0))
+        return max(self.depth(a) for a in e.args) + (_SLOW if slow else 1)
+
+    def temporary(self, text: str) -> str:
+        if text not in self.temporaries:
+            self.temporaries[text] = f"q{len(self.temporaries)}"
+            self.lines.append(f"{self.temporaries[text]} = {text}")
+        return self.temporaries[text]
+
+    def atom(self, e: sp.Expr) -> str:
+        """The expression as one name or literal."""
+        text = self.text(e)
+        return text if text.isidentifier() or _is_literal(text) else self.temporary(text)
+
+    def text(self, e: sp.Expr) -> str:
+        if not e.free_symbols:
+            return repr(float(e.evalf(25)))
+        if e.is_Symbol:
+            return self.names[e]
+        if e.is_Add:
+            return self._sum(e)
+        if e.is_Mul:
+            return self._product(e)
+        if e.is_Pow:
+            return self._power(e.base, e.exp)
+        return self._call(e)
+
+    def _sum(self, e: sp.Expr) -> str:
+        out = ""
+        for term in sorted(e.as_ordered_terms(), key=self.depth):
+            coefficient, rest = term.as_coeff_Mul()
+            negative = coefficient.is_negative
+            text = self._factor(-term if negative else term)
+            out += (" - " if out else "-") + text if negative else (" + " if out else "") + text
+        return out
+
+    def _product(self, e: sp.Expr) -> str:
+        coefficient, rest = e.as_coeff_Mul()
+        if coefficient == -1:
+            return f"-{self._factor(rest)}"
+        factors = [] if coefficient == 1 else [repr(float(coefficient))]
+        return "*".join(factors + [self._factor(f) for f in sorted(rest.args if rest.is_Mul else (rest,), key=self.depth)])
+
+    def _factor(self, e: sp.Expr) -> str:
+        text = self.text(e)
+        return f"({text})" if e.is_Add or text.startswith("-") else text
+
+    def _power(self, base: sp.Expr, exponent: sp.Expr) -> str:
+        twice = float(2 * exponent) if exponent.is_Rational or exponent.is_Float else 0.5
+        if not (twice.is_integer() and abs(twice) <= 128):
+            if str(base) == "E":
+                return f"exp({self.text(exponent)})"
+            return f"pow({self.text(base)}, {self.text(exponent)})"
+        whole, half = divmod(int(twice), 2)
+        b = self.atom(base)
+        factors = [self.temporary(f"sqrt({b})")] if half else []
+        if whole:
+            factors.append(self._integer_power(b if whole > 0 else self.temporary(f"1.0/{b}"), abs(whole)))
+        return "*".join(factors)
+
+    def _integer_power(self, b: str, k: int) -> str:
+        """b^k by repeated squaring."""
+        if k == 1:
+            return b
+        half = self.temporary(f"{b}*{b}") if k > 3 or k % 2 == 0 else b
+        if k == 2:
+            return half
+        if k == 3:
+            return self.temporary(f"{b}*{b}") + f"*{b}"
+        rest = self._integer_power(half, k // 2)
+        rest = rest if rest.isidentifier() else self.temporary(rest)
+        return f"{rest}*{b}" if k % 2 else rest
+
+    def _call(self, e: sp.Expr) -> str:
+        name = type(e).__name__
+        if name in ("Max", "Min"):
+            text = self.atom(e.args[0])
+            for other in e.args[1:]:
+                text = f"{name.lower()}imum({text}, {self.atom(other)})"
+            return text
+        if name == "exp" or name in CALLS:
+            args = e.args[:1] if name == "Heaviside" else e.args
+            return f"{CALLS.get(name, name)}({', '.join(self.text(a) for a in args)})"
+        raise ValueError(f"no compiled form for {name!r} in {e}")
+
+
+def _is_literal(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return not text.startswith("-")
+
+
+def function(name: str, arguments: Sequence[str], names: Mapping[sp.Symbol, str], outputs: Sequence[sp.Expr]) -> str:
+    """Source of an inlined scalar function that returns the tuple of `outputs`.
+
+    `names` gives each SymPy symbol its argument's name.
+    """
+    import sympy as sp
+
+    shared, reduced = sp.cse(list(outputs), symbols=sp.numbered_symbols("c", cls=sp.Dummy))
+    writer = _Writer(names)
+    for i, (temporary, value) in enumerate(shared):
+        writer.name(temporary, f"c{i}", value)
+    results = [writer.text(e) for e in reduced]
+    body = writer.lines + [f"return ({', '.join(results)},)"]
+    return f"@inline\ndef {name}({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in body) + "\n\n"

@@ -1,0 +1,61 @@
+"""Names that a fragment may use and that the generated module around it defines: for readers and type checkers only.
+
+Fragments import from here so that they can be read, linted and checked as ordinary Python; the composer drops the import.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from piazzi.kernels.plain import *  # noqa: F403
+from piazzi.kernels.plain import Array, Indices
+
+ND: int
+N: int
+M: int
+NUMBERS: int
+LANES: int
+
+
+# written by generate.py
+dynamics: Any
+rhs: Any
+substep: Any
+substep_jacobian: Any
+first_rows: Any
+complete: Any
+measure_into: Any
+innovate: Any
+# written in fragments/noise_*.py, update_*.py, transition.py
+travel: Any
+transition: Any
+advance: Any
+symmetric: Any
+absorb: Any
+decorrelate: Any
+record: Any
+update_epoch: Any
+# written in fragments/noise_*.py, linearize.py, chain.py
+linearize_dynamics: Any
+noise_at: Any
+noise_varies: Any
+linearize_rows: Any
+chain_cost: Any
+
+marginal_covariances: Any
+forward: Any
+forward_following: Any
+record_epoch: Any
+Q_matrix: Any
+back_through_epoch: Any
+backward: Any
+absorb_epoch: Any
+update_scalar: Any
+factor_noise: Any
+rotate_in: Any
+invert_triangle: Any
+noise_root: Any
+belief: Any
+transposed_lu: Any
+step_information: Any
+back_information: Any

@@ -1,0 +1,6 @@
+"""Equations: what moves, how, and what is seen of it."""
+
+from piazzi.model.model import STEP, TIME, Model, nearest
+from piazzi.model.sensor import Parameter, Role, Sensor
+
+__all__ = ["STEP", "TIME", "Model", "Parameter", "Role", "Sensor", "nearest"]

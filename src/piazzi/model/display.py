@@ -1,0 +1,68 @@
+"""A model as its author would write it on paper."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from piazzi.model.derivation import derive, derive_sensor
+
+if TYPE_CHECKING:
+    from piazzi.model.model import Model
+
+
+def sections(model: Model) -> list[tuple[str, Any]]:
+    """Titles and SymPy objects: state, parameters, dynamics and F, and h and H of every sensor."""
+    import sympy as sp
+
+    d = derive(model)
+    name_of_f = "x[k+1]" if model.discrete else "dx/dt = f"
+    out: list[tuple[str, Any]] = [("state x", sp.Matrix(d.x))]
+    if model.parameters:
+        out.append(("parameters p", sp.Matrix([sp.Symbol(p) for p in model.parameter_names])))
+    out += [(name_of_f, d.f), ("Phi = dx[k+1]/dx" if model.discrete else "F = df/dx", d.F)]
+    for sensor in model.sensors:
+        h, H, own = derive_sensor(model, sensor)
+        if own:
+            out.append((f"numbers of {sensor.name}", sp.Matrix(own)))
+        out += [(f"h of {sensor.name}", h), (f"H = dh/dx of {sensor.name}", H)]
+    return out
+
+
+def latex(model: Model) -> str:
+    """The sections as one LaTeX display."""
+    import sympy as sp
+
+    rows = [rf"\text{{{title.replace('_', chr(92) + '_')}}} &= {sp.latex(value)}" for title, value in sections(model)]
+    return r"$$\begin{aligned}" + r"\\[4pt] ".join(rows) + r"\end{aligned}$$"
+
+
+def rich_text(model: Model) -> Any:
+    """The sections as a rich group of titled, two-dimensional formulas."""
+    import sympy as sp
+    from rich.console import Group
+    from rich.text import Text
+
+    parts: list[Any] = []
+    for title, value in sections(model):
+        role = {p.name: p.role for p in model.parameters}
+        note = "  (" + ", ".join(f"{k}: {r}" for k, r in role.items()) + ")" if title.startswith("parameters") else ""
+        parts += [Text(title + note, style="bold cyan"), Text(sp.pretty(value, use_unicode=True, wrap_line=False)), Text("")]
+    return Group(*parts)
+
+
+def show(model: Model) -> None:
+    """Display the model where the caller is: LaTeX in a notebook, rich text in a terminal."""
+    try:
+        from IPython import get_ipython  # type: ignore[import-not-found,unused-ignore]
+
+        notebook = get_ipython() is not None and "IPKernelApp" in get_ipython().config
+    except ImportError:
+        notebook = False
+    if notebook:
+        from IPython.display import Math, display  # type: ignore[import-not-found,unused-ignore]
+
+        display(Math(latex(model).strip("$")))
+        return
+    from rich.console import Console
+
+    Console().print(rich_text(model), soft_wrap=True)

@@ -1,0 +1,178 @@
+"""The physics, said once: states, their equations of motion, what the sensors see.  Text only, nothing numeric."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import cached_property
+from typing import Any
+
+from piazzi.expressions import names
+from piazzi.model.sensor import Parameter, Sensor, name_of, text_of
+
+TIME = "t"
+STEP = "dt"
+
+
+def nearest(name: str, valid: Any) -> str:
+    """'; did you mean ...?' with the nearest valid name, or the list of them, for error messages."""
+    options = [str(v) for v in valid]
+    close = get_close_matches(str(name), options, n=1)
+    if close:
+        return f"; did you mean {close[0]!r}?"
+    return f"; known: {', '.join(options)}" if options else ""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Dynamics and sensors as equations, from which everything else is derived.
+
+    Parameters
+    ----------
+    states : sequence of names or SymPy symbols
+    dynamics : sequence of equations in the order of the states, or mapping of state to equation
+        dx/dt = f(x, parameters, t), as text or SymPy.  With ``discrete=True`` the next state x[k+1], where the name ``dt``
+        is the length of the step in seconds.
+    sensors : sequence of Sensor
+    parameters : sequence of names or `Parameter`, or mapping of name to role
+    groups : mapping of a group's name to its states, such as ``{"position": ["x", "y"]}``
+        Errors are summed over groups; "position" is what pictures draw.
+    units : mapping of state to unit, such as ``{"x": "m"}``
+    discrete : bool
+
+    Raises
+    ------
+    ValueError
+        For an equation outside the restricted language or with an unknown name, repeated names, or wrong counts.
+    """
+
+    states: tuple[str, ...]
+    dynamics: tuple[str, ...]
+    sensors: tuple[Sensor, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+    groups: Any = field(default_factory=dict)
+    units: Any = field(default_factory=dict)
+    discrete: bool = False
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "states", tuple(name_of(s, "state") for s in self.states))
+        put(self, "parameters", tuple(_parameter(p) for p in _items(self.parameters)))
+        put(self, "sensors", tuple([self.sensors] if isinstance(self.sensors, Sensor) else self.sensors))
+        put(self, "dynamics", self._equations())
+        put(self, "groups", tuple((str(g), tuple(str(s) for s in members)) for g, members in dict(self.groups).items()))
+        put(self, "units", tuple((str(s), str(u)) for s, u in dict(self.units).items()))
+        self._check_names()
+        self._check_equations()
+
+    def _equations(self) -> tuple[str, ...]:
+        given = self.dynamics
+        if isinstance(given, Mapping):
+            by_name = {str(k): v for k, v in given.items()}
+            for k in by_name:
+                if k not in self.states:
+                    raise ValueError(f"dynamics has an equation for {k!r}, which is not a state{nearest(k, self.states)}")
+            missing = [s for s in self.states if s not in by_name]
+            if missing:
+                raise ValueError(f"dynamics has no equation for state {missing[0]!r}")
+            given = tuple(by_name[s] for s in self.states)
+        equations = tuple(text_of(e) for e in given)
+        if len(equations) != len(self.states):
+            raise ValueError(f"dynamics has {len(equations)} equations for {len(self.states)} states ({', '.join(self.states)})")
+        return equations
+
+    def _check_names(self) -> None:
+        if not self.states:
+            raise ValueError("a model needs at least one state")
+        taken: dict[str, str] = {TIME: "the time", STEP: "the length of a step"}
+        everything = [("state", s) for s in self.states] + [("parameter", p.name) for p in self.parameters]
+        for what, name in everything:
+            if name in taken:
+                raise ValueError(f"{what} {name!r} is also {taken[name]}: every name has one meaning")
+            taken[name] = f"a {what}"
+        seen: set[str] = set()
+        for sensor in self.sensors:
+            if sensor.name in seen:
+                raise ValueError(f"two sensors are called {sensor.name!r}")
+            seen.add(sensor.name)
+        for group, members in self.groups:
+            for member in members:
+                if member not in self.names:
+                    raise ValueError(f"group {group!r} names {member!r}, which is not a state{nearest(member, self.names)}")
+        for name, _ in self.units:
+            if name not in self.names:
+                raise ValueError(f"units names {name!r}, which is not a state{nearest(name, self.names)}")
+
+    def _check_equations(self) -> None:
+        allowed = {*self.states, *self.parameter_names, TIME} | ({STEP} if self.discrete else set())
+        for state, equation in zip(self.states, self.dynamics, strict=True):
+            for name in sorted(names(equation) - allowed):
+                hint = nearest(name, sorted(allowed))
+                raise ValueError(f"dynamics of {state!r} uses {name!r}, which is neither a state nor a parameter{hint}")
+
+    @cached_property
+    def parameter_names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.parameters)
+
+    @cached_property
+    def constants(self) -> tuple[str, ...]:
+        """Parameters that are estimated: they follow the states, with zero dynamics."""
+        return tuple(p.name for p in self.parameters if p.role == "estimated")
+
+    @cached_property
+    def given(self) -> tuple[str, ...]:
+        """Parameters that kernels take as numbers: the fixed and the considered ones."""
+        return tuple(p.name for p in self.parameters if p.role != "estimated")
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Everything that is estimated, in order: the states, then the estimated constants."""
+        return self.states + self.constants
+
+    @property
+    def n(self) -> int:
+        """Number of estimated values."""
+        return len(self.names)
+
+    @cached_property
+    def width(self) -> int:
+        """Components of the widest sensor."""
+        return max((s.width for s in self.sensors), default=1)
+
+    @cached_property
+    def group_indices(self) -> dict[str, tuple[int, ...]]:
+        """For every group, where its states stand in `names`."""
+        return {g: tuple(self.names.index(m) for m in members) for g, members in self.groups}
+
+    def sensor(self, name: str) -> Sensor:
+        """The sensor of that name; raises ValueError with the nearest one."""
+        for sensor in self.sensors:
+            if sensor.name == name:
+                return sensor
+        raise ValueError(f"unknown sensor {name!r}{nearest(name, [s.name for s in self.sensors])}")
+
+    def numbers(self, sensor: Sensor) -> tuple[str, ...]:
+        """Names of the numbers that a station with this sensor must give, in alphabetical order."""
+        return tuple(sorted(sensor.free_names - {*self.states, *self.parameter_names, TIME}))
+
+    def unit(self, name: str) -> str:
+        """Unit of a state or an estimated constant, "" where none was given."""
+        units = {p.name: p.unit for p in self.parameters} | dict(self.units)
+        return units.get(name, "")
+
+    def show(self) -> None:
+        """Display states, parameters, dynamics, F, h and H: LaTeX in a notebook, rich text in a terminal."""
+        from piazzi.model.display import show
+
+        show(self)
+
+
+def _items(parameters: Any) -> list[Any]:
+    if isinstance(parameters, Mapping):
+        return [Parameter(name_of(k, "parameter"), v) for k, v in parameters.items()]
+    return list(parameters)
+
+
+def _parameter(given: Any) -> Parameter:
+    return given if isinstance(given, Parameter) else Parameter(name_of(given, "parameter"))

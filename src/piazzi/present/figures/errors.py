@@ -1,0 +1,122 @@
+"""How wrong the estimates are, and how wrong they say they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from piazzi.estimate import Estimate
+from piazzi.evaluate.compare import Comparison
+from piazzi.evaluate.metrics import errors, groups
+from piazzi.evaluate.quantities import Display, display_of, unit_of
+from piazzi.present.figures.style import MEASURED, colour_of, drawn, label_of, line_of, plain, plain_ticks, symmetric_scale, time_axis
+from piazzi.problem.checks import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SIGMAS = 3.0
+
+
+def state_error(ax: Axes, estimate: Estimate, state: str, *, name: str = "estimate", show: Display | None = None) -> Axes:
+    """Error of one state within the +-3 sigma of its covariance, against time; the band alone where there is no truth.
+
+    `show` is the unit to draw in, by default what suits the size of the errors.
+
+    Raises
+    ------
+    ValueError
+        For a state that the model does not have.
+    """
+    band, error = error_and_band(estimate, state)
+    show = show or state_display([estimate], state)
+    time = time_axis(ax, estimate.times)
+    part = drawn(len(band))
+    t, half = estimate.times[part] * time.factor, band[part] * show.factor
+    colour = colour_of(name)
+    ax.fill_between(t, -half, half, color=colour, alpha=0.18, lw=0, label="+-3 sigma")
+    for sign in (-1, 1):
+        ax.plot(t, sign * half, color=colour, lw=0.6, alpha=0.6)
+    if error is not None:
+        ax.plot(t, error[part] * show.factor, color=colour, lw=1.1, label="error")
+    ax.axhline(0, color=MEASURED, lw=0.6)
+    symmetric_scale(ax, [size_of(estimate, state) * show.factor])
+    ax.set_ylabel(show.label(f"error of {plain(state)}"))
+    return ax
+
+
+def error_and_band(estimate: Estimate, state: str) -> tuple[Array, Array | None]:
+    """Three standard deviations of a state and its error, (K,) each; the error is None where it is not known."""
+    if state not in estimate.names:
+        raise ValueError(f"unknown state {state!r}; known: {', '.join(estimate.names)}")
+    i = estimate.names.index(state)
+    error = errors(estimate)
+    band = SIGMAS * np.sqrt(np.maximum(estimate.covariance[:, i, i], 0.0))
+    return band, None if error is None or np.isnan(error[:, i]).all() else error[:, i]
+
+
+def size_of(estimate: Estimate, state: str) -> Array:
+    """The larger of band and error at each epoch, (K,)."""
+    band, error = error_and_band(estimate, state)
+    return band if error is None else np.fmax(band, np.abs(error))
+
+
+def state_display(estimates: Sequence[Estimate], state: str) -> Display:
+    """The unit that suits the errors of a state in all these estimates."""
+    sizes = [size_of(e, state) for e in estimates]
+    typical = [float(np.median(s[np.isfinite(s)])) for s in sizes if np.isfinite(s).any()]
+    return display_of(estimates[0].problem.model.unit(state), typical)
+
+
+def error_overlay(ax: Axes, comparison: Comparison, group: str) -> Axes:
+    """Length of the error of a group of states against time, a line for every estimator; empty where there is no truth.
+
+    Raises
+    ------
+    ValueError
+        For a group that the model does not have.
+    """
+    return _overlay(ax, comparison, group, [error for error, _ in _lengths(comparison, group)], "error")
+
+
+def claim_overlay(ax: Axes, comparison: Comparison, group: str) -> Axes:
+    """Length that the covariance expects of the error, the root of the summed variances, against time for every estimator.
+
+    Raises
+    ------
+    ValueError
+        For a group that the model does not have.
+    """
+    return _overlay(ax, comparison, group, [claimed for _, claimed in _lengths(comparison, group)], "error expected")
+
+
+def _overlay(ax: Axes, comparison: Comparison, group: str, lengths: Sequence[Array | None], what: str) -> Axes:
+    views, times, model = comparison.views, comparison.tracking.times, comparison.problem.model
+    both = [v for pair in _lengths(comparison, group) for v in pair if v is not None and np.isfinite(v).any()]
+    unit = unit_of(model.unit(s) for s in dict(model.groups).get(group, (group,)))
+    show = display_of(unit, [float(np.nanmedian(v)) for v in both])
+    time, part, names = time_axis(ax, times), drawn(len(times)), tuple(name for name, _ in views)
+    for (name, view), length in zip(views, lengths, strict=True):
+        if length is not None:
+            style = line_of(name, view, names)
+            ax.plot(times[part] * time.factor, length[part] * show.factor, **style, lw=1.2, label=label_of(name, view))
+    if any(v is not None and (v > 0).any() for v in lengths):
+        ax.set_yscale("log")
+        plain_ticks(ax)
+    ax.set_ylabel(show.label(f"{plain(group)} {what}"))
+    return ax
+
+
+def _lengths(comparison: Comparison, group: str) -> list[tuple[Array | None, Array]]:
+    """For every view the length of the error vector, and the root of the summed variances, (K,) each."""
+    out = []
+    for estimate in comparison.views.values():
+        found = groups(estimate)
+        if group not in found:
+            raise ValueError(f"unknown group {group!r}; known: {', '.join(found)}")
+        columns, error = list(found[group]), errors(estimate)
+        claimed = np.sqrt(np.maximum(np.diagonal(estimate.covariance, axis1=1, axis2=2)[:, columns].sum(axis=1), 0.0))
+        out.append((None if error is None else np.sqrt((error[:, columns] ** 2).sum(axis=1)), claimed))
+    return out

@@ -1,0 +1,73 @@
+"""What was measured, and what was left over."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from piazzi.estimate import Estimate
+from piazzi.evaluate.quantities import Display, display_of, unit_of
+from piazzi.present.figures.style import MEASURED, STATIONS, colour_of, drawn, plain, time_axis
+from piazzi.problem import Problem, Tracking
+from piazzi.problem.checks import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SIGMAS = 3.0
+
+
+def component_of(problem: Problem, column: int) -> tuple[str, str]:
+    """Name and unit of a column of measurements; names of several sensors joined, unit "" where they differ."""
+    sensors = [problem.model.sensor(s.sensor) for s in problem.stations]
+    found = dict.fromkeys((s.components[column], dict(s.units)[s.components[column]]) for s in sensors if s.width > column)
+    return " / ".join(dict.fromkeys(name for name, _ in found)), unit_of(unit for _, unit in found)
+
+
+def measurements(ax: Axes, problem: Problem, tracking: Tracking, column: int = 0) -> Axes:
+    """One component of the measurements against time, a colour for each station."""
+    name, unit = component_of(problem, column)
+    values = tracking.values[:, column]
+    show = display_of(unit, [float(np.nanmax(np.abs(values), initial=0.0))])
+    time = time_axis(ax, tracking.times)
+    index = tracking.stations_of(problem)
+    for s, station in enumerate(problem.stations):
+        rows = np.flatnonzero((index == s) & ~np.isnan(values))
+        rows = rows[drawn(len(rows))]
+        colour = MEASURED if len(problem.stations) == 1 else STATIONS[s % len(STATIONS)]
+        ax.plot(tracking.row_times[rows] * time.factor, values[rows] * show.factor, ".", ms=2.5, color=colour, label=plain(station.name))
+    if show.unit == "deg" and np.nanmax(np.abs(values), initial=0.0) > np.pi / 2:
+        ax.set_yticks(np.arange(-180, 181, 90))
+    ax.set_ylabel(show.label(plain(name)))
+    return ax
+
+
+def innovations(ax: Axes, estimate: Estimate, column: int = 0, *, name: str = "estimate") -> Axes:
+    """One component of the innovations against time, within 3 sigma of what the estimator expected of them."""
+    label, unit = component_of(estimate.problem, column)
+    nu, S = estimate.innovations[:, column], estimate.innovation_covariances[:, column, column]
+    rows = np.flatnonzero(np.isfinite(nu) & np.isfinite(S))
+    rows = rows[drawn(len(rows))]
+    band = SIGMAS * np.sqrt(np.maximum(S[rows], 0.0))
+    show = display_of(unit, [float(np.median(band)) if len(rows) else 0.0])
+    time = time_axis(ax, estimate.times)
+    t = estimate.tracking.row_times[rows] * time.factor
+    ax.fill_between(t, -band * show.factor, band * show.factor, color=colour_of(name), alpha=0.15, lw=0, label="3 sigma")
+    ax.plot(t, nu[rows] * show.factor, ".", ms=2.5, color=colour_of(name), label=plain(name))
+    ax.axhline(0, color=MEASURED, lw=0.7)
+    _limit(ax, t, nu[rows], band, show, colour_of(name))
+    ax.set_ylabel(show.label(f"innovation of {plain(label)}"))
+    return ax
+
+
+def _limit(ax: Axes, t: Array, nu: Array, band: Array, show: Display, colour: str) -> None:
+    """Limits by the band once settled and by nearly all innovations; those few beyond become arrows at the edge."""
+    if not len(nu):
+        return
+    half = max(1.15 * float(np.quantile(np.abs(nu), 0.99)), 1.6 * float(np.median(band))) * show.factor
+    if half > 0:
+        ax.set_ylim(-half, half)
+        for sign, marker in ((1, "^"), (-1, "v")):
+            beyond = sign * nu * show.factor > half
+            ax.plot(t[beyond], np.full(beyond.sum(), 0.95 * sign * half), marker, ms=4, color=colour)

@@ -1,0 +1,166 @@
+"""The path in space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from piazzi.estimate import Estimate
+from piazzi.evaluate.metrics import known_truth
+from piazzi.evaluate.quantities import Display, display_of, unit_of
+from piazzi.present.figures.style import PLANET, TRUTH, drawn, label_of, line_of, plain
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.patches import Ellipse
+
+SIGMAS = 3.0
+
+
+def position_columns(problem: Problem) -> tuple[int, int] | None:
+    """Columns of the first two components of the group "position", None where there are not two."""
+    found = problem.model.group_indices.get("position", ())
+    return (found[0], found[1]) if len(found) > 1 else None
+
+
+def orbit(
+    ax: Axes, estimate: Estimate, *, name: str = "estimate", planet_radius: float | None = None, ellipses: int = 9
+) -> Axes:
+    """Estimated path and truth in the plane of the first two components of position, the planet to scale, and 3-sigma ellipses.
+
+    Raises
+    ------
+    ValueError
+        Where the model has no group "position" with two states.
+    """
+    from matplotlib.patches import Circle
+
+    i, j = _columns(estimate.problem)
+    truth, path = known_truth(estimate), estimate.mean[:, [i, j]]
+    show = _unit(estimate.problem, path if truth is None else truth[:, [i, j]])
+    if planet_radius:
+        ax.add_patch(Circle((0, 0), planet_radius * show.factor, color=PLANET, lw=0, zorder=0.5))
+        ax.annotate("planet", (0, 0), ha="center", va="center", color="#44505A")
+    part = drawn(len(path))
+    if truth is not None:
+        ax.plot(*(truth[part][:, [i, j]].T * show.factor), color=TRUTH, lw=2.2, alpha=0.85, label="truth", zorder=2)
+    ax.plot(*(path[part].T * show.factor), **line_of(name, ""), lw=1.2, label=label_of(name, estimate.view), zorder=3)
+    reference = path if truth is None else truth[:, [i, j]]
+    extent = _extent(reference, planet_radius) * show.factor
+    drawn_ellipses = _ellipses(estimate, (i, j), show, ellipses, largest=float(np.max(extent[1] - extent[0])))
+    for n, patch in enumerate(drawn_ellipses):
+        patch.set(facecolor=(*_rgb(name), 0.13), edgecolor=_rgb(name), lw=0.9, zorder=2.5, label="3-sigma ellipse" if not n else None)
+        ax.add_patch(patch)
+    _frame(ax, extent, drawn_ellipses)
+    return _labelled(ax, estimate.problem, (i, j), show)
+
+
+def position_at(ax: Axes, estimates: Mapping[tuple[str, str], Estimate], k: int = -1) -> Axes:
+    """Where each estimator puts the object at epoch `k`, relative to the truth (else to the first of them), with 3-sigma ellipses.
+
+    Parameters
+    ----------
+    estimates : mapping of (name, view) to Estimate
+    """
+    found = {key: e for key, e in estimates.items() if np.isfinite(e.mean[k]).all() and np.isfinite(e.covariance[k]).all()}
+    first = next(iter(estimates.values()))
+    i, j = _columns(first.problem)
+    truth = known_truth(first)
+    known = truth is not None and bool(np.isfinite(truth[k, [i, j]]).all())
+    origin = truth[k, [i, j]] if truth is not None and known else next(iter(found.values()), first).mean[k, [i, j]]
+    sigma = [SIGMAS * np.sqrt(np.diagonal(e.covariance[k])[[i, j]].max()) for e in found.values()]
+    show = display_of(_unit_name(first.problem), sigma)
+    names = tuple(name for name, _ in found)
+    for n, ((name, view), e) in enumerate(found.items()):
+        style, width = line_of(name, view, names), 1.4 + 4.5 * (1 - n / len(found)) ** 2  # where two coincide, both are seen
+        patch = _ellipse(e.mean[k, [i, j]] - origin, e.covariance[k][np.ix_([i, j], [i, j])], show)
+        patch.set(fill=False, edgecolor=style["color"], linestyle=style["linestyle"], lw=width)
+        ax.add_patch(patch)
+        ax.plot(*((e.mean[k, [i, j]] - origin) * show.factor), "o", ms=2.5 + 1.5 * width, color=style["color"])
+        ax.plot([], [], **style, lw=1.6, label=label_of(name, view))
+    if known:
+        ax.plot(0, 0, "+", ms=12, mew=2, color=TRUTH, label="truth", zorder=4)
+    ax.autoscale_view()
+    ax.margins(0.12)
+    ax.set_aspect("equal", adjustable="datalim")
+    names_of_states = first.names
+    against = "truth" if known else "first estimate"
+    ax.set_xlabel(show.label(plain(f"{names_of_states[i]} - {against}")))
+    ax.set_ylabel(show.label(plain(f"{names_of_states[j]} - {against}")))
+    ax.set_title(f"3-sigma ellipses at t = {first.times[k]:g} s")
+    return ax
+
+
+def _columns(problem: Problem) -> tuple[int, int]:
+    found = position_columns(problem)
+    if found is None:
+        raise ValueError('an orbit needs a group "position" of two states or more: Model(groups={"position": ["x", "y"]})')
+    return found
+
+
+def _unit_name(problem: Problem) -> str:
+    return unit_of(problem.model.unit(problem.model.names[c]) for c in _columns(problem))
+
+
+def _unit(problem: Problem, path: Array) -> Display:
+    return display_of(_unit_name(problem), [float(v) for v in np.abs(path[np.isfinite(path)]).max(initial=0.0, keepdims=True).ravel()])
+
+
+def _rgb(name: str) -> tuple[float, float, float]:
+    from matplotlib.colors import to_rgb
+
+    return to_rgb(line_of(name, "")["color"])
+
+
+def _extent(path: Array, planet_radius: float | None) -> Array:
+    """Lower and upper corner of what must be seen: the path, without its wildest hundredth, and the planet."""
+    good = path[np.isfinite(path).all(axis=1)]
+    corners = np.quantile(good, [0.005, 0.995], axis=0) if len(good) else np.array([[-1.0, -1.0], [1.0, 1.0]])
+    radius = planet_radius or 0.0
+    return np.array([np.minimum(corners[0], -radius), np.maximum(corners[1], radius)]) if radius else corners
+
+
+def _ellipses(estimate: Estimate, columns: tuple[int, int], show: Display, count: int, largest: float) -> list[Ellipse]:
+    """Ellipses at evenly spaced epochs, the first and last included; those larger than the whole picture say nothing."""
+    K = len(estimate.mean)
+    out = []
+    for k in dict.fromkeys(np.linspace(0, K - 1, min(count, K)).astype(int).tolist()):
+        mean, P = estimate.mean[k, list(columns)], estimate.covariance[k][np.ix_(columns, columns)]
+        if np.isfinite(mean).all() and np.isfinite(P).all():
+            patch = _ellipse(mean, P, show)
+            if max(patch.width, patch.height) <= max(largest, 1e-300):
+                out.append(patch)
+    return out
+
+
+def _ellipse(mean: Array, P: Array, show: Display) -> Ellipse:
+    from matplotlib.patches import Ellipse
+
+    values, vectors = np.linalg.eigh(P)
+    axes = 2 * SIGMAS * np.sqrt(np.maximum(values, 0.0)) * show.factor
+    return Ellipse(tuple(mean * show.factor), axes[1], axes[0], angle=float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))))
+
+
+def _frame(ax: Axes, extent: Array, patches: list[Ellipse]) -> None:
+    """Limits that hold the path and every ellipse whole."""
+    low, high = extent.copy()
+    for patch in patches:
+        corners = patch.get_path().transformed(patch.get_patch_transform()).get_extents()
+        low, high = np.minimum(low, corners.min), np.maximum(high, corners.max)
+    margin = 0.05 * np.maximum(high - low, 1e-12 + 1e-6 * np.abs(high)).max()
+    ax.set_xlim(low[0] - margin, high[0] + margin)
+    ax.set_ylim(low[1] - margin, high[1] + margin)
+    ax.set_aspect("equal", adjustable="box")
+
+
+def _labelled(ax: Axes, problem: Problem, columns: tuple[int, int], show: Display) -> Axes:
+    from matplotlib.ticker import MaxNLocator
+
+    ax.xaxis.set_major_locator(MaxNLocator(5))
+    ax.set_xlabel(show.label(plain(problem.model.names[columns[0]])))
+    ax.set_ylabel(show.label(plain(problem.model.names[columns[1]])))
+    return ax

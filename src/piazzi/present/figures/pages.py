@@ -1,0 +1,149 @@
+"""Whole pictures: axes put together, titled, and saved."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from piazzi.estimate import Estimate
+from piazzi.evaluate.compare import Comparison
+from piazzi.evaluate.metrics import errors, groups
+from piazzi.present.figures.errors import claim_overlay, error_overlay, size_of, state_display, state_error
+from piazzi.present.figures.measurements import innovations, measurements
+from piazzi.present.figures.orbit import orbit, position_at, position_columns
+from piazzi.present.figures.style import RC, label_of, plain, symmetric_scale
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS = ("png", "pdf", "svg")
+# no dates in files: the same picture has the same bytes
+_METADATA: dict[str, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
+
+
+def pages(comparison: Comparison, *, title: str = "", planet_radius: float | None = None) -> Iterator[tuple[str, Figure]]:
+    """Names and figures of the standard pictures of a comparison, drawn one at a time as they are asked for."""
+    from matplotlib import rc_context
+
+    makers: list[tuple[str, Callable[[], Figure]]] = []
+    views = comparison.views
+    if views:
+        if position_columns(comparison.problem):
+            makers.append(("orbit", lambda: orbit_page(comparison, planet_radius)))
+        makers += [
+            ("measurements", lambda: measurement_page(comparison)),
+            ("errors", lambda: error_page(comparison)),
+            ("comparison", lambda: overlay_page(comparison)),
+        ]
+    for name, make in makers:
+        with rc_context(RC):
+            figure = make()
+            if title:
+                figure.suptitle(plain(title), fontsize=11, x=0.01, ha="left")
+        yield name, figure
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
+    """Write a figure as PNG, PDF or SVG by the ending, to a temporary name first; returns the path.
+
+    Raises
+    ------
+    ValueError
+        For another ending.
+    OSError
+        Where it cannot be written.
+    """
+    from matplotlib import rc_context
+
+    target = Path(path)
+    kind = target.suffix[1:].lower()
+    if kind not in FORMATS:
+        raise ValueError(f"{target}: a picture ends in {', '.join('.' + f for f in FORMATS)}, not {target.suffix!r}")
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        with rc_context(RC):
+            figure.savefig(temporary, format=kind, dpi=150, metadata=_METADATA[kind])
+        os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return target
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _first(comparison: Comparison) -> tuple[str, Estimate]:
+    """The estimate that single pictures show: the first that succeeded, else the first."""
+    found = list(comparison.estimates.items())
+    return next(((name, e) for name, e in found if e.success), found[0])
+
+
+def orbit_page(comparison: Comparison, planet_radius: float | None = None) -> Figure:
+    """The orbit with the planet, and where every estimator puts the object at the end."""
+    name, estimate = _first(comparison)
+    figure = _figure(10.5, 5.4)
+    left, right = figure.subplots(1, 2, width_ratios=(1.2, 1))
+    orbit(left, estimate, name=name, planet_radius=planet_radius)
+    left.set_title(f"Orbit by {plain(name)}")
+    position_at(right, comparison.views)
+    found = {label: handle for ax in (left, right) for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=6)
+    return figure
+
+
+def measurement_page(comparison: Comparison) -> Figure:
+    """For each component the measurements above, and the innovations of one estimator below."""
+    name, estimate = _first(comparison)
+    width = comparison.problem.model.width
+    figure = _figure(10.5, 2.5 * 2 * width + 0.4)
+    axes = figure.subplots(2 * width, 1, squeeze=False, sharex=True)[:, 0]
+    for column in range(width):
+        top, bottom = axes[2 * column : 2 * column + 2]
+        measurements(top, comparison.problem, comparison.tracking, column).label_outer()
+        top.set_title("Measurements")
+        if len(comparison.problem.stations) > 1:
+            top.legend(loc="upper right", ncols=4)
+        innovations(bottom, estimate, column, name=name).label_outer()
+        bottom.set_title(f"Innovations of {plain(name)} within 3 sigma")
+    return figure
+
+
+def error_page(comparison: Comparison) -> Figure:
+    """A column for each estimator (a window's real-time view), a row for each state: errors within +-3 sigma."""
+    estimates = list(comparison.estimates.items())
+    states = comparison.problem.model.names
+    figure = _figure(max(5.5, 3.6 * len(estimates)), 1.75 * len(states) + 0.6)
+    axes = figure.subplots(len(states), len(estimates), squeeze=False, sharex=True, sharey="row")
+    for r, state in enumerate(states):
+        show = state_display([e for _, e in estimates], state)
+        for c, (name, estimate) in enumerate(estimates):
+            state_error(axes[r, c], estimate, state, name=name, show=show).label_outer()
+        symmetric_scale(axes[r, 0], [size_of(e, state) * show.factor for _, e in estimates])
+    for ax, (name, estimate) in zip(axes[0], estimates, strict=True):
+        ax.set_title(f"{label_of(name, estimate.view)}: error within +-3 sigma")
+    figure.align_ylabels(list(axes[:, 0]))
+    return figure
+
+
+def overlay_page(comparison: Comparison) -> Figure:
+    """Errors of all estimators over each other on the left, what their covariances expect on the right, a row for each group."""
+    first = next(iter(comparison.estimates.values()))
+    names, known = list(groups(first)), errors(first) is not None
+    figure = _figure(10.5, 2.7 * len(names) + 0.7)
+    axes = figure.subplots(len(names), 1 + known, squeeze=False, sharex=True, sharey="row")
+    for row, group in zip(axes, names, strict=True):
+        if known:
+            error_overlay(row[0], comparison, group).label_outer()
+        claim_overlay(row[-1], comparison, group).label_outer()
+        row[-1].set_ylabel("" if known else row[-1].get_ylabel())
+    if known:
+        axes[0, 0].set_title("Error")
+    axes[0, -1].set_title("Error that the covariance expects (1 sigma)")
+    figure.align_ylabels(list(axes[:, 0]))
+    figure.legend(*axes[0, -1].get_legend_handles_labels(), loc="outside lower center", ncols=5)
+    return figure

@@ -1,0 +1,122 @@
+"""What all pictures share: a colour for each estimator, units on axes, the axis of time, how many points are drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piazzi.evaluate.quantities import Display
+from piazzi.problem.checks import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Okabe and Ito (2008), distinguishable with every kind of colour vision; the same estimator has the same colour everywhere
+COLOURS = {
+    "ekf": "#0072B2",
+    "iekf": "#56B4E9",
+    "ukf": "#CC79A7",
+    "graph": "#D55E00",
+    "window": "#009E73",
+    "smoother": "#E69F00",
+    "batch": "#7A7A7A",
+}
+OTHER = "#7A7A7A"
+TRUTH = "#000000"
+MEASURED = "#555555"
+PLANET = "#C9D3DC"
+STATIONS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MOST_POINTS = 4000
+RC: dict[str, Any] = {
+    "font.size": 9.0,
+    "axes.titlesize": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#E4E4E4",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.3,
+    "svg.hashsalt": "piazzi",  # the same picture has the same bytes
+}
+
+
+def colour_of(name: str) -> str:
+    """Colour of an estimator by the name it has on the command line; options after the colon do not change it."""
+    return COLOURS.get(name.partition(":")[0], OTHER)
+
+
+def line_of(name: str, view: str, names: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Colour and line style: dashed for what a window says late; paler for the second and later ones of one kind."""
+    from matplotlib.colors import to_rgb
+
+    kind = name.partition(":")[0]
+    same = [n for n in dict.fromkeys(names) if n.partition(":")[0] == kind]
+    pale = 0.6 * same.index(name) / len(same) if name in same else 0.0
+    colour = tuple(c + pale * (1.0 - c) for c in to_rgb(colour_of(name)))
+    dashed = kind == "window" and view == "delayed"
+    return {"color": colour, "linestyle": (0, (4, 1.5)) if dashed else "-"}
+
+
+def label_of(name: str, view: str) -> str:
+    """Name for legends; a window says which of its two views is meant."""
+    return plain(f"{name}, {'delayed' if view == 'delayed' else 'real time'}" if name.partition(":")[0] == "window" else name)
+
+
+def plain(text: str) -> str:
+    """User text that matplotlib does not take for a formula."""
+    return text.replace("$", r"\$")
+
+
+def time_display(times: Array) -> Display:
+    """Hours, minutes or seconds, whichever suits the span of the run."""
+    span = float(times[-1] - times[0]) if len(times) else 0.0
+    return Display("h", 1 / 3600) if span >= 7200 else Display("min", 1 / 60) if span >= 600 else Display("s")
+
+
+def drawn(count: int) -> slice:
+    """Which of so many points are drawn: all, or evenly spaced ones where there are more than a picture can show."""
+    return slice(None, None, max(1, -(-count // MOST_POINTS)))
+
+
+def time_axis(ax: Axes, times: Array) -> Display:
+    """Label and limit the axis of time; returns its unit."""
+    show = time_display(times)
+    ax.set_xlabel(show.label("time"))
+    if len(times) > 1:
+        margin = 0.01 * (times[-1] - times[0])
+        ax.set_xlim((times[0] - margin) * show.factor, (times[-1] + margin) * show.factor)
+    return show
+
+
+def symmetric_scale(ax: Axes, sizes: Sequence[Array]) -> None:
+    """Limits about zero that hold all these sizes; logarithmic away from zero where they shrink by more than a factor of 30."""
+    sizes = [np.asarray(s)[np.isfinite(s) & (s > 0)] for s in sizes]
+    if not sum(s.size for s in sizes):
+        return
+    largest = max(float(s.max(initial=0.0)) for s in sizes)
+    settled = min(float(np.median(s[len(s) // 2 :])) for s in sizes if s.size)
+    if largest > 30 * settled:
+        _logarithmic(ax, settled, largest)
+    ax.set_ylim(-1.15 * largest, 1.15 * largest)
+
+
+def _logarithmic(ax: Axes, threshold: float, largest: float) -> None:
+    """A scale that is linear up to the threshold and logarithmic beyond, with at most four powers of ten marked on each side."""
+    from matplotlib.ticker import NullLocator
+
+    ax.set_yscale("symlog", linthresh=threshold)
+    powers = np.arange(np.floor(np.log10(threshold)), np.ceil(np.log10(largest)) + 1)
+    marks = 10.0 ** powers[:: -(-len(powers) // 4)]
+    ax.set_yticks([*-marks[::-1], 0.0, *marks])
+    ax.yaxis.set_minor_locator(NullLocator())
+    plain_ticks(ax)
+
+
+def plain_ticks(ax: Axes) -> None:
+    """Numbers such as 0.01 and 1000 on a logarithmic axis, instead of powers of ten."""
+    ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")

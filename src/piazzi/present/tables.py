@@ -1,0 +1,57 @@
+"""Tables for terminals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from piazzi.estimate import Estimate
+from piazzi.evaluate.metrics import errors
+from piazzi.evaluate.quantities import display_of, duration, with_sigma
+from piazzi.problem import Problem, Tracking
+
+
+def summary(problem: Problem, tracking: Tracking, source: str) -> str:
+    """One line on what there is: source, epochs, how long, who measured, whether the truth is known."""
+    times, count = tracking.times, len(problem.stations)
+    span = f" over {duration(float(times[-1] - times[0]))}" if len(times) > 1 else ""
+    stations = problem.stations[0].name if count == 1 else f"{count} stations"
+    missing = int(np.isnan(tracking.values).all(axis=1).sum())
+    parts = [
+        f"{source}: {_count(len(times), 'epoch')}{span}",
+        f"{_count(len(tracking.row_times) - missing, 'measurement')} by {stations}",
+        *([f"{missing:,} missing"] if missing else []),
+        "truth known" if tracking.truth is not None else "truth not known",
+    ]
+    return ", ".join(parts)
+
+
+def _count(many: int, what: str) -> str:
+    return f"{many:,} {what}{'' if many == 1 else 's'}"
+
+
+def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
+    """A rich table of every state at epoch `k` with its standard deviation, and its error where the truth is known."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    error = errors(estimate)
+    view = "with later measurements too" if estimate.view == "delayed" else "from measurements up to then"
+    title = f"State at t = {estimate.times[k]:g} s, {name}, {view}"
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), header_style="bold", title=Text(title), title_justify="left")
+    table.add_column("state", no_wrap=True)
+    for heading in ("estimate", "sigma", *(["error"] if error is not None else [])):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    sigmas = np.sqrt(np.maximum(np.diagonal(estimate.covariance[k]), 0.0))
+    for i, state in enumerate(estimate.names):
+        value, sigma = float(estimate.mean[k, i]), float(sigmas[i])
+        show = display_of(estimate.problem.model.unit(state), [value])
+        texts = [*with_sigma(value * show.factor, sigma * show.factor)]
+        if error is not None:
+            e = float(error[k, i]) * show.factor
+            texts.append(with_sigma(e, sigma * show.factor)[0] if np.isfinite(e) else "-")
+        table.add_row(Text(state), *texts, Text(show.unit))
+    return table

@@ -1,0 +1,96 @@
+"""The numbers that a problem is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from piazzi.kernels import Integrator
+from piazzi.problem.checks import Array, numeric
+
+
+@dataclass(frozen=True, eq=False)
+class Gaussian:
+    """A belief: mean (n,) and covariance (n, n), in the order and the units of the states.
+
+    A vector of n numbers as covariance is its diagonal; one number each describes a single value.
+    """
+
+    mean: Any
+    covariance: Any
+
+    @classmethod
+    def from_sigma(cls, mean: Any, sigma: Any) -> Gaussian:
+        """Independent values with these standard deviations."""
+        return cls(mean, np.diag(np.atleast_1d(numeric(sigma, "sigma")) ** 2))
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessNoise:
+    """White noise that drives the states.
+
+    Parameters
+    ----------
+    covariance : (n, n), or its diagonal (n,); semidefinite, zero allowed
+    per : "second" (a spectral density, unit^2/s) or "step" (added once per interval, whatever its length)
+    method : "integral" or "scaled"
+        How a density becomes the covariance Q of one interval: the integral of Phi Q Phi^T over it, or Q dt.
+    """
+
+    covariance: Any
+    per: Literal["second", "step"] = "second"
+    method: Literal["integral", "scaled"] = "integral"
+
+    def __post_init__(self) -> None:
+        for what, value, valid in (("per", self.per, ("second", "step")), ("method", self.method, ("integral", "scaled"))):
+            if value not in valid:
+                raise ValueError(f"process noise: {what} is {value!r}; it must be one of {', '.join(valid)}")
+
+    @property
+    def is_integral(self) -> bool:
+        return self.per == "second" and self.method == "integral"
+
+    def scale(self, intervals: Array) -> Array:
+        """Factor of the matrix in each interval."""
+        return np.ones(len(intervals)) if self.per == "step" else np.array(intervals, dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class Station:
+    """A place that measures: a sensor of the model, its noise R (m, m) and the sensor's own numbers.
+
+    `noise` is a full covariance matrix, a diagonal, or one variance; SI units and radians.
+    """
+
+    name: str
+    sensor: str
+    noise: Any
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What really happens where that differs from what the estimators assume; used by simulation only.
+
+    Parameters
+    ----------
+    state : (n,) or None
+        The true first state; None draws it from the prior.
+    parameters : mapping of name to number
+        True values of parameters that differ.
+    process_noise : ProcessNoise or None
+        None: the same as the estimators assume.
+    integrator : Integrator or None
+        None: the same.
+    measurement_noise : bool
+        False gives noiseless measurements.
+    """
+
+    state: Any = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    process_noise: ProcessNoise | None = None
+    integrator: Integrator | None = None
+    measurement_noise: bool = True

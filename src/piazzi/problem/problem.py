@@ -1,0 +1,243 @@
+"""A model with its numbers.  Every check of a problem's inputs is made here; kernels trust them afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from piazzi.kernels import Discrete, Integrator, KernelSpec, RungeKutta4
+from piazzi.model import Model, nearest
+from piazzi.problem import functions
+from piazzi.problem.checks import Array, covariance, finite_vector, frozen, numeric
+from piazzi.problem.parts import Gaussian, ProcessNoise, Station, Truth
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Everything an estimator needs besides the measurements.
+
+    Parameters
+    ----------
+    model : Model
+    prior : Gaussian
+        Belief about the states (not the estimated constants) at `prior_time`.
+    process_noise : ProcessNoise, or a matrix (a density per second, integrated), or None for none
+    stations : sequence of Station
+    parameters : mapping of name to number
+        An estimated or considered constant takes a `Gaussian`, ``Gaussian(mean, variance)``.
+    integrator : Integrator
+        Default `RungeKutta4()`, ten substeps per interval; `Discrete()` for a model that is a step.
+    prior_time : float, optional
+        Seconds; default the first epoch of the tracking.
+    truth : Truth, optional
+        What simulation does differently.
+    name : str
+
+    Raises
+    ------
+    ValueError
+        For wrong shapes, asymmetric or indefinite covariances, values that are not finite, missing or unknown names.
+    """
+
+    model: Model
+    prior: Gaussian
+    process_noise: Any = None
+    stations: Sequence[Station] = ()
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    integrator: Integrator | None = None
+    prior_time: float | None = None
+    truth: Truth | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "process_noise", self._noise(self.process_noise))
+        put(self, "stations", self._stations())
+        put(self, "parameters", self._parameters())
+        put(self, "integrator", self._integrator())
+        if self.prior_time is not None and not isfinite(self.prior_time):
+            raise ValueError(f"prior_time is {self.prior_time}; it must be finite")
+        put(self, "prior", self._prior())
+        self._check_regular()
+
+    # ---- checks --------------------------------------------------------------------------------------------------
+
+    def _prior(self) -> Gaussian:
+        states = self.model.states
+        mean = finite_vector(self.prior.mean, len(states), "prior mean", states)
+        return Gaussian(mean, covariance(self.prior.covariance, len(states), "prior covariance", states))
+
+    def _noise(self, given: Any) -> ProcessNoise:
+        states, names = self.model.states, self.model.names
+        noise = given if isinstance(given, ProcessNoise) else ProcessNoise(np.zeros(len(states)) if given is None else given)
+        if self.model.discrete and noise.is_integral:
+            noise = ProcessNoise(noise.covariance, "second" if given is None else noise.per, "scaled")
+        whole = np.shape(noise.covariance)[:1] == (len(names),) and len(names) > len(states)
+        matrix = covariance(noise.covariance, len(names if whole else states), "process noise Q", names if whole else states)
+        full = np.zeros((len(names), len(names)))
+        full[: len(matrix), : len(matrix)] = matrix
+        return ProcessNoise(frozen(full), noise.per, noise.method)
+
+    def _stations(self) -> tuple[Station, ...]:
+        out: list[Station] = []
+        for station in [self.stations] if isinstance(self.stations, Station) else self.stations:
+            sensor = self.model.sensor(station.sensor)
+            if any(station.name == other.name for other in out):
+                raise ValueError(f"two stations are called {station.name!r}")
+            what = f"measurement noise R of station {station.name!r}"
+            noise = covariance(station.noise, sensor.width, what, sensor.components, definite=True)
+            out.append(Station(station.name, station.sensor, noise, self._numbers(station)))
+        return tuple(out)
+
+    def _numbers(self, station: Station) -> dict[str, float]:
+        wanted = self.model.numbers(self.model.sensor(station.sensor))
+        for name in station.numbers:
+            if name not in wanted:
+                raise ValueError(f"station {station.name!r} gives {name!r}, which sensor {station.sensor!r} does not use{nearest(name, wanted)}")
+        for name in wanted:
+            if name not in station.numbers:
+                raise ValueError(f"station {station.name!r} gives no value for {name!r}, which sensor {station.sensor!r} uses")
+        return {name: _number(station.numbers[name], f"{name!r} of station {station.name!r}") for name in wanted}
+
+    def _parameters(self) -> dict[str, Any]:
+        known = {p.name: p for p in self.model.parameters}
+        for name in self.parameters:
+            if name not in known:
+                raise ValueError(f"unknown parameter {name!r}{nearest(name, known)}")
+        return {name: self._parameter(name, known[name].role) for name in known}
+
+    def _parameter(self, name: str, role: str) -> Any:
+        if name not in self.parameters:
+            raise ValueError(f"parameter {name!r} has no value")
+        given = self.parameters[name]
+        if role == "fixed":
+            return _number(given, f"parameter {name!r}")
+        if not isinstance(given, Gaussian):
+            raise ValueError(f"parameter {name!r} is {role}: give Gaussian(mean, variance), not {given!r}")
+        mean = finite_vector(given.mean, 1, f"parameter {name!r}", [name])
+        return Gaussian(mean, covariance(given.covariance, 1, f"variance of parameter {name!r}", [name]))
+
+    def _integrator(self) -> Integrator:
+        if self.integrator is None:
+            return Discrete() if self.model.discrete else RungeKutta4()
+        if self.model.discrete != isinstance(self.integrator, Discrete):
+            kind = "a step, x[k+1]: use Discrete()" if self.model.discrete else "continuous: Discrete() does not apply"
+            raise ValueError(f"integrator {type(self.integrator).__name__} does not fit: the model is {kind}")
+        return self.integrator
+
+    def _check_regular(self) -> None:
+        """Refuse a prior mean at which an equation has no value, such as the centre of attraction."""
+        where = functions.singular_equation(self)
+        if where:
+            raise ValueError(where)
+
+    # ---- what kernels are given ----------------------------------------------------------------------------------
+
+    @cached_property
+    def mean(self) -> Array:
+        """Prior mean of everything estimated, (n,)."""
+        return frozen([*self.prior.mean, *(self.parameters[c].mean[0] for c in self.model.constants)])
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Prior covariance of everything estimated, (n, n)."""
+        out = np.zeros((self.model.n, self.model.n))
+        nd = len(self.model.states)
+        out[:nd, :nd] = self.prior.covariance
+        for i, name in enumerate(self.model.constants, start=nd):
+            out[i, i] = self.parameters[name].covariance[0, 0]
+        return frozen(out)
+
+    @cached_property
+    def given(self) -> Array:
+        """Values of the parameters that are not estimated, at least one number long."""
+        values = [self.parameters[name] for name in self.model.given]
+        return frozen([v.mean[0] if isinstance(v, Gaussian) else v for v in values] or [0.0])
+
+    @cached_property
+    def station_sensor(self) -> Array:
+        """Index of each station's sensor, (S,)."""
+        names = [s.name for s in self.model.sensors]
+        return np.array([names.index(s.sensor) for s in self.stations], dtype=np.int64)
+
+    @cached_property
+    def station_noise(self) -> Array:
+        """R of each station, (S, M, M), unit variance where a sensor has fewer components."""
+        out = np.tile(np.eye(self.model.width), (len(self.stations), 1, 1))
+        for s, station in enumerate(self.stations):
+            m = len(station.noise)
+            out[s, :m, :m] = station.noise
+        return frozen(out)
+
+    @cached_property
+    def station_correlated(self) -> Array:
+        """For each station, 1 where its R is not diagonal, (S,)."""
+        return np.array([int(np.count_nonzero(R - np.diag(np.diag(R)))) > 0 for R in self.station_noise], dtype=np.int64)
+
+    @cached_property
+    def station_numbers(self) -> Array:
+        """Each station's own numbers in alphabetical order, (S, widest)."""
+        width = max([len(self.model.numbers(s)) for s in self.model.sensors] + [1])
+        out = np.zeros((len(self.stations), width))
+        for s, station in enumerate(self.stations):
+            out[s, : len(station.numbers)] = list(station.numbers.values())
+        return frozen(out)
+
+    def spec(self, *fragments: str, lanes: int = 1) -> KernelSpec:
+        """The compiled module with these fragments, for this model, integrator and kind of process noise."""
+        assert self.integrator is not None
+        return KernelSpec(self.model, self.integrator.scheme, fragments, lanes)
+
+    @property
+    def noise_fragment(self) -> str:
+        return "noise_integral" if self.process_noise.is_integral else "noise_scaled"
+
+    def intervals(self, times: Array) -> tuple[float, Array, Array]:
+        """Time of the prior, and for each epoch the substeps and the noise scale of the interval that ends there."""
+        assert self.integrator is not None
+        start = float(times[0]) if self.prior_time is None else float(self.prior_time)
+        if start > times[0]:
+            raise ValueError(f"the prior is at {start:g} s, after the first measurement at {times[0]:g} s")
+        dt = np.diff(times, prepend=start)
+        return start, self.integrator.counts(dt), self.process_noise.scale(dt)
+
+    # ---- the model's functions, for users ------------------------------------------------------------------------
+
+    def dynamics(self, x: Any, t: Any = 0.0) -> Array:
+        """dx/dt at one state (n,) or many (K, n), same shape."""
+        return functions.dynamics(self, x, t)
+
+    def dynamics_jacobian(self, x: Any, t: Any = 0.0) -> Array:
+        """F = df/dx at one state (n, n) or many (K, n, n)."""
+        return functions.dynamics_jacobian(self, x, t)
+
+    def step(self, x: Any, dt: float, t: Any = 0.0) -> tuple[Array, Array]:
+        """The state `dt` seconds later and the derivative of that step, shapes (n,), (n, n) or (K, n), (K, n, n)."""
+        return functions.step(self, x, dt, t)
+
+    def measure(self, station: str, x: Any, t: Any = 0.0) -> Array:
+        """Noiseless measurement h of a station, (m,) or (K, m)."""
+        return functions.measure(self, station, x, t)
+
+    def measurement_jacobian(self, station: str, x: Any, t: Any = 0.0) -> Array:
+        """H = dh/dx of a station, (m, n) or (K, m, n)."""
+        return functions.measurement_jacobian(self, station, x, t)
+
+    def station_index(self, name: str) -> int:
+        """Position of a station; raises ValueError with the nearest name."""
+        names = [s.name for s in self.stations]
+        if name not in names:
+            raise ValueError(f"unknown station {name!r}{nearest(name, names)}")
+        return names.index(name)
+
+
+def _number(value: Any, what: str) -> float:
+    out = numeric(value, what)
+    if out.size != 1 or not np.isfinite(out).all():
+        raise ValueError(f"{what} is {value!r}; it must be one finite number")
+    return float(out.reshape(-1)[0])

@@ -1,0 +1,151 @@
+"""Measurements: one flat, time-sorted table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piazzi.problem.checks import Array, frozen, numeric
+
+if TYPE_CHECKING:
+    from piazzi.problem.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Tracking:
+    """Rows of measurements in order of time; rows of one time form an epoch.
+
+    Parameters
+    ----------
+    row_times : (J,), seconds after `epoch`, not decreasing
+    values : (J, m) or (J,)
+        Up to the widest sensor's components; NaN where a value is missing.
+    row_stations : (J,) names, optional
+        Not needed where the problem has one station.
+    truth : (K, n), optional
+        True state at each epoch.
+    epoch : str
+        Calendar date of time zero, where there is one.
+
+    Attributes
+    ----------
+    times : (K,), the epochs, strictly increasing
+    first_row : (K + 1,), rows of epoch k are first_row[k] to first_row[k + 1]
+
+    Raises
+    ------
+    ValueError
+        For no measurements, times that are not finite or decrease, infinite values, or wrong shapes.
+    """
+
+    row_times: Any
+    values: Any
+    row_stations: Sequence[str] | None = None
+    truth: Any = None
+    epoch: str = ""
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "row_times", self._checked_times())
+        put(self, "values", self._checked_values())
+        if self.row_stations is not None:
+            names = np.asarray(self.row_stations, dtype=np.str_).reshape(-1)
+            if len(names) != len(self.row_times):
+                raise ValueError(f"row_stations has {len(names)} names for {len(self.row_times)} rows")
+            names.setflags(write=False)
+            put(self, "row_stations", names)
+        if self.truth is not None:
+            put(self, "truth", self._checked_truth())
+
+    def _checked_times(self) -> Array:
+        times = numeric(self.row_times, "times").reshape(-1)
+        if not times.size:
+            raise ValueError("there are no measurements")
+        if not np.isfinite(times).all():
+            k = int(np.flatnonzero(~np.isfinite(times))[0])
+            raise ValueError(f"time of row {k} is {times[k]}; it must be finite")
+        down = np.flatnonzero(np.diff(times) < 0)
+        if down.size:
+            k = int(down[0]) + 1
+            raise ValueError(f"times must increase: row {k} is at {times[k]:g} s, after {times[k - 1]:g} s")
+        return frozen(times)
+
+    def _checked_values(self) -> Array:
+        values = numeric(self.values, "measurements")
+        values = values.reshape(-1, 1) if values.ndim < 2 else values
+        if values.ndim != 2 or len(values) != len(self.row_times):
+            raise ValueError(f"measurements have shape {np.shape(self.values)} for {len(self.row_times)} times")
+        bad = np.argwhere(np.isinf(values))
+        if bad.size:
+            k, i = bad[0]
+            raise ValueError(f"measurement of row {k} (t = {self.row_times[k]:g} s), component {i}, is {values[k, i]}; write NaN for a missing one")
+        if np.isnan(values).all():
+            raise ValueError("there are no measurements: every value is missing")
+        return frozen(values)
+
+    def _checked_truth(self) -> Array:
+        truth = numeric(self.truth, "truth")
+        if truth.ndim != 2 or len(truth) != len(self.times):
+            raise ValueError(f"truth has shape {truth.shape} for {len(self.times)} epochs")
+        if np.isinf(truth).any():
+            k, i = np.argwhere(np.isinf(truth))[0]
+            raise ValueError(f"truth of epoch {k}, state {i}, is {truth[k, i]}; it must be finite")
+        return frozen(truth)
+
+    @cached_property
+    def first_row(self) -> Array:
+        starts = np.flatnonzero(np.diff(self.row_times, prepend=-np.inf) > 0)
+        return np.append(starts, len(self.row_times)).astype(np.int64)
+
+    @cached_property
+    def times(self) -> Array:
+        out: Array = self.row_times[self.first_row[:-1]]
+        out.setflags(write=False)
+        return out
+
+    def stations_of(self, problem: Problem) -> Array:
+        """Index into the problem's stations for every row, (J,) int64.
+
+        Raises
+        ------
+        ValueError
+            For an unknown station (with the nearest name), or more values than its sensor has components.
+        """
+        if not problem.stations:
+            raise ValueError("the problem has no stations, so nothing can be measured")
+        if self.row_stations is None:
+            if len(problem.stations) > 1:
+                names = ", ".join(s.name for s in problem.stations)
+                raise ValueError(f"the tracking does not say which station measured; the problem has {names}")
+            index = np.zeros(len(self.row_times), dtype=np.int64)
+        else:
+            unique, inverse = np.unique(np.asarray(self.row_stations), return_inverse=True)
+            index = np.array([problem.station_index(str(name)) for name in unique], dtype=np.int64)[inverse]
+        self._check_widths(problem, index)
+        return index
+
+    def _check_widths(self, problem: Problem, index: Array) -> None:
+        widths = np.array([len(s.noise) for s in problem.stations])
+        columns = self.values.shape[1]
+        if columns <= widths.min():
+            return
+        beyond = np.arange(columns)[None, :] >= widths[index][:, None]
+        bad = np.argwhere(beyond & ~np.isnan(self.values))
+        if bad.size:
+            k = int(bad[0, 0])
+            station = problem.stations[index[k]]
+            raise ValueError(f"row {k} (t = {self.row_times[k]:g} s) has more values than the {widths[index[k]]} components of station {station.name!r}")
+
+    def padded(self, width: int) -> Array:
+        """Values with exactly `width` columns, NaN where there were fewer."""
+        columns = self.values.shape[1]
+        if columns == width:
+            values: Array = self.values
+            return values
+        out = np.full((len(self.values), width), np.nan)
+        out[:, : min(columns, width)] = self.values[:, :width]
+        return out

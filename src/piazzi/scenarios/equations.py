@@ -1,0 +1,224 @@
+"""The half of a scenario file that is physics: states, equations of motion, parameters and sensors, read into a `Model`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, get_args
+
+from piazzi.expressions import check
+from piazzi.model import STEP, TIME, Model, Parameter, Role, Sensor, nearest
+from piazzi.model.sensor import name_of
+from piazzi.scenarios.faults import shown
+from piazzi.scenarios.table import Table
+from piazzi.scenarios.units import ONE, Unit, Units
+
+MAX_STATES = 100
+
+
+@dataclass
+class Physics:
+    """What the equations' half says: the model, None where it is faulty, and the unit of every name."""
+
+    model: Model | None = None
+    states: list[str] = field(default_factory=list)
+    constants: list[str] = field(default_factory=list)
+    units: dict[str, Unit] = field(default_factory=dict)
+    components: dict[str, dict[str, Unit]] = field(default_factory=dict)
+    numbers: dict[str, dict[str, Unit]] = field(default_factory=dict)
+
+    def factors(self, names: Collection[str]) -> list[float]:
+        """SI factor of each of these states and parameters."""
+        return [self.units.get(name, ONE).factor for name in names]
+
+
+@lru_cache(maxsize=64)
+def shared(model: Model) -> Model:
+    """One object for all equal models, so that what is derived from it is derived once."""
+    return model
+
+
+def read_physics(file: Table, units: Units) -> Physics:
+    """Read [states], [groups], [dynamics] or [step], [parameters] and [sensors]."""
+    before = len(file.faults)
+    out = Physics()
+    out.units |= named_units(file, "states", units, "state")
+    out.states = list(out.units)
+    if not out.states and len(file.faults) == before:
+        file.fault("states", "is missing: name the states with their units")
+    if len(out.states) > MAX_STATES:
+        file.fault("states", f"has {len(out.states)} states; at most {MAX_STATES} are allowed")
+    if not 0 < len(out.states) <= MAX_STATES:
+        return out
+    parameters = _parameters(file.table("parameters"), units, out)
+    dynamics = _dynamics(file, out)
+    sensors = [_sensor(name, table, units, out) for name, table in file.table("sensors").tables()]
+    groups = _groups(file, out)
+    if len(file.faults) == before:
+        labels = {s: out.units[s].label for s in out.states if out.units[s].label}
+        with file.faults.at(""):
+            equations = tuple(dynamics[s] for s in out.states)
+            sound = tuple(s for s in sensors if s is not None)
+            out.model = shared(Model(tuple(out.states), equations, sound, tuple(parameters), groups, labels, "step" in file))
+    return out
+
+
+def named_units(table: Table, key: str, units: Units, what: str) -> dict[str, Unit]:
+    """Names with their units: a table of name to unit, or, where the file is in SI, a list of names."""
+    value = table.raw(key)
+    if value is None:
+        return {}
+    if isinstance(value, list) and units.declared:
+        table.fault(key, f"is a list, but the file is not in SI: write name = unit for every {what}, such as {_example(units)}")
+        return {}
+    if isinstance(value, list) and all(isinstance(v, str) for v in value):
+        if len(set(value)) < len(value):
+            table.fault(key, f"names {next(v for v in value if value.count(v) > 1)!r} twice")
+        pairs: Mapping[str, Any] = dict.fromkeys(value, "")
+    elif isinstance(value, Mapping):
+        pairs = value
+    else:
+        table.fault(key, f"must be a table of name = unit, not {shown(value)}")
+        return {}
+    out: dict[str, Unit] = {}
+    inner = Table(pairs, table.at(key), table.faults)
+    for name in pairs:
+        with table.faults.at(inner.at(name)):
+            out[name_of(name, what)] = unit_of(inner, name, units) if isinstance(value, Mapping) else ONE
+    return out
+
+
+def unit_of(table: Table, key: str, units: Units) -> Unit:
+    """The unit that a key gives; dimensionless, after a fault, where it gives none that is known."""
+    text = table.text(key)
+    if text is None:
+        if table.raw(key) is None and units.declared:
+            table.fault(key, f"is missing: the file is not in SI, so give a unit, such as {_example(units)}")
+        return ONE
+    with table.faults.at(table.at(key)):
+        return units.unit(text)
+    return ONE
+
+
+def _example(units: Units) -> str:
+    return f"'length/time' (here {units.base[0]}/{units.base[2]}), or '1' for none"
+
+
+def _parameters(table: Table, units: Units, out: Physics) -> list[Parameter]:
+    found = [_parameter(name, table, units, out) for name in table.data]
+    parameters = [p for p in found if p is not None]
+    out.constants = [p.name for p in parameters if p.role == "estimated"]
+    return parameters
+
+
+def _parameter(name: str, table: Table, units: Units, out: Physics) -> Parameter | None:
+    """A parameter: a number, or a table with role and unit.  Its values are read with the other numbers."""
+    given = table.raw(name)
+    role, unit = "fixed", ONE
+    if isinstance(given, Mapping):
+        inner = table.table(name)
+        role = inner.text("role", "fixed", get_args(Role)) or "fixed"
+        unit = unit_of(inner, "unit", units)
+    elif units.declared:
+        table.fault(name, f"is only a number, but the file is not in SI: write {{ value = ..., unit = {_example(units)} }}")
+    with table.faults.at(table.at(name)):
+        if name in out.units:
+            raise ValueError("is also a state: every name has one meaning")
+        parameter = Parameter(name, role, unit.label)  # type: ignore[arg-type]
+        out.units[name] = unit
+        return parameter
+    return None
+
+
+def _dynamics(file: Table, out: Physics) -> dict[str, str]:
+    """Text of every state's equation."""
+    key = "step" if "step" in file else "dynamics"
+    if "step" in file and "dynamics" in file:
+        file.fault("dynamics", "stands beside [step]: rates or a step x[k+1], not both")
+        file.raw("dynamics")
+    if key not in file:
+        file.fault("dynamics", "is missing: give the rate of every state")
+        return {}
+    table = file.table(key)
+    allowed = {*out.units, TIME, *([STEP] if key == "step" else [])}
+    equations = {state: equation(table, state, allowed) for state in out.states}
+    for state in out.states:
+        if state not in table:
+            table.fault("", f"has no equation for state {state!r}")
+    if out.states:
+        table.finish()
+    return equations
+
+
+def equation(table: Table, key: str, allowed: Collection[str]) -> str:
+    """The text of an equation in which only these names occur."""
+    value = table.raw(key)
+    if value is None:
+        return "0"
+    text = repr(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
+    if not isinstance(text, str):
+        table.fault(key, f"must be an equation in quotes, not {shown(value)}")
+        return "0"
+    with table.faults.at(table.at(key)):
+        check(text, allowed)
+    return text
+
+
+def _sensor(name: str, table: Table, units: Units, out: Physics) -> Sensor | None:
+    """A sensor from its components and the names of its stations' own numbers."""
+    numbers = named_units(table, "numbers", units, "number")
+    for clash in numbers.keys() & out.units.keys():
+        table.fault("numbers", f"names {clash!r}, which is also a state or a parameter")
+    components = table.table("components")
+    if not components.data:
+        table.fault("components", "is missing: a sensor needs at least one equation")
+    equations, angles, kinds = {}, [], {}
+    for key in components.data:
+        equations[key], kinds[key], angle = _component(components, key, {*out.units, *numbers, TIME}, units)
+        angles += [key] if angle else []
+    table.finish()
+    out.components[name], out.numbers[name] = kinds, numbers
+    with table.faults.at(table.path):
+        sensor = Sensor(name, equations, tuple(angles), {k: u.label for k, u in kinds.items() if u.label})
+        for unused in sorted(numbers.keys() - sensor.free_names):
+            table.fault("numbers", f"names {unused!r}, which no equation of the sensor uses{nearest(unused, sorted(sensor.free_names))}")
+        return sensor
+    return None
+
+
+def _component(table: Table, key: str, allowed: Collection[str], units: Units) -> tuple[str, Unit, bool]:
+    """Equation and unit of a component, and whether it is an angle, which wraps."""
+    if not isinstance(table.raw(key), Mapping):
+        text = equation(table, key, allowed)
+        if units.declared:
+            table.fault(key, f"has no unit, but the file is not in SI: write {{ equation = ..., unit = {_example(units)} }}")
+        if "atan2" in text:
+            table.fault(key, 'uses atan2: say { equation = ..., unit = "rad" } for an angle, which wraps, or angle = false')
+        return text, ONE, False
+    inner = table.table(key)
+    if "equation" not in inner:
+        inner.fault("equation", "is missing")
+    text = equation(inner, "equation", allowed)
+    unit = unit_of(inner, "unit", units)
+    angle = inner.flag("angle", unit.is_angle)
+    if "atan2" in text and "unit" not in inner and "angle" not in inner:
+        inner.fault("unit", 'is missing: say unit = "rad" for an angle, which wraps, or angle = false')
+    inner.finish()
+    return text, unit, bool(angle)
+
+
+def _groups(file: Table, out: Physics) -> dict[str, tuple[str, ...]]:
+    groups = {}
+    table = file.table("groups")
+    for name in table.data:
+        members = table.raw(name)
+        if not isinstance(members, list) or not all(isinstance(m, str) for m in members) or not members:
+            table.fault(name, f"must be a list of states, not {shown(members)}")
+            continue
+        known = [*out.states, *out.constants]
+        for member in members:
+            if member not in known:
+                table.fault(name, f"names {shown(member)}, which is not a state{nearest(member[:60], known)}")
+        groups[name] = tuple(members)
+    return groups

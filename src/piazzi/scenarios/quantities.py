@@ -1,0 +1,150 @@
+"""The half of a scenario file that is numbers: prior, noise, stations and parameters, in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from piazzi.model import Model
+from piazzi.problem import Gaussian, ProcessNoise, Station
+from piazzi.problem.checks import Array, covariance
+from piazzi.scenarios.equations import Physics
+from piazzi.scenarios.faults import shown
+from piazzi.scenarios.table import Table
+from piazzi.scenarios.units import ONE, Units
+
+SPREADS = ("sigma", "variance", "covariance")
+
+
+def read_spread(
+    table: Table, names: Sequence[str], factors: Sequence[float], *, definite: bool = False, missing: float | None = None
+) -> Array | None:
+    """Covariance matrix (n, n) in SI from one of the keys sigma, variance and covariance; None where that is faulty."""
+    given = [key for key in SPREADS if key in table]
+    if len(given) != 1:
+        which = "has neither" if not given else f"has {' and '.join(given)}"
+        table.fault("", f"{which}: give one of {', '.join(SPREADS)}" if given else f"needs one of {', '.join(SPREADS)}")
+        return None
+    key, scale = given[0], np.asarray(factors, dtype=float)
+    if key == "covariance":
+        value = table.matrix(key, names)
+        out = None if value is None else value * np.outer(scale, scale)
+    else:
+        vector = table.vector(key, names, missing=missing)
+        if vector is not None and (vector < 0).any():
+            i = int(np.argmax(vector < 0))
+            table.fault(key, f"of {names[i]!r} is {vector[i]:g}; it must not be negative")
+            return None
+        with np.errstate(over="ignore"):
+            out = None if vector is None else np.diag((vector * scale) ** 2 if key == "sigma" else vector * scale**2)
+    if out is None:
+        return None
+    with table.faults.at(table.at(key)):
+        return covariance(out, len(names), "the matrix", names, definite=definite)
+    return None
+
+
+def read_prior(table: Table, physics: Physics, truth: Table, units: Units) -> tuple[Gaussian | None, float | None]:
+    """Belief about the states, and its time; ``mean = "truth"`` is the perfect guess."""
+    states = physics.states
+    factors = physics.factors(states)
+    if table.raw("mean") is None:
+        table.fault("mean", "is missing: give a number for every state")
+    source, key = (truth, "state") if table.raw("mean") == "truth" else (table, "mean")
+    if source is truth and not isinstance(truth.raw("state"), list | Mapping):
+        table.fault("mean", 'is "truth", so truth.state must give numbers')
+        source = Table({}, "", table.faults)
+    mean = source.vector(key, states)
+    P = read_spread(table, states, factors)
+    time = table.number("time", units.time())
+    table.finish(SPREADS)
+    if mean is None or P is None:
+        return None, time
+    return Gaussian(mean * factors, P), time
+
+
+def read_noise(table: Table, physics: Physics) -> ProcessNoise | None:
+    """Process noise of the states, or of states and estimated constants; names that a table leaves out have none."""
+    names = physics.states
+    everything = [*names, *physics.constants]
+    for key in SPREADS:
+        value = table.raw(key)
+        if isinstance(value, list) and len(value) == len(everything) or isinstance(value, Mapping) and set(value) & set(physics.constants):
+            names = everything
+    per = table.text("per", "second", ("second", "step"))
+    method = table.text("method", "integral", ("integral", "scaled"))
+    Q = read_spread(table, names, physics.factors(names), missing=0.0)
+    table.finish(SPREADS)
+    if Q is None or per is None or method is None:
+        return None
+    return ProcessNoise(Q, per, method)  # type: ignore[arg-type]
+
+
+def read_station(table: Table, physics: Physics) -> Station | None:
+    """A station: its name, sensor, noise and own numbers."""
+    sensors = list(physics.components)
+    name = table.text("name")
+    if name is None and table.raw("name") is None:
+        table.fault("name", "is missing")
+    elif not name:
+        table.fault("name", "must be a name")
+    sensor = table.text("sensor", sensors[0] if len(sensors) == 1 else None, sensors)
+    if "sensor" not in table and len(sensors) > 1:
+        table.fault("sensor", f"is missing: one of {', '.join(sensors)}")
+    if sensor is None:
+        table.finish(("noise", "numbers"))
+        return None
+    components, own = physics.components[sensor], physics.numbers[sensor]
+    if not isinstance(table.raw("noise"), Mapping):
+        table.fault("noise", f"must be a table, such as {{ sigma = {[1.0] * len(components) if len(components) > 1 else 1.0} }}")
+        R = None
+    else:
+        noise = table.table("noise")
+        R = read_spread(noise, list(components), [u.factor for u in components.values()], definite=True)
+        noise.finish(SPREADS)
+    before = len(table.faults)
+    given = table.table("numbers")
+    numbers = {key: given.number(key, own.get(key, ONE).factor) for key in own}
+    for key in own:
+        if key not in given:
+            table.fault("numbers", f"has no value for {key!r}, which sensor {sensor!r} uses")
+    given.finish()
+    table.finish()
+    if R is None or not name or len(table.faults) > before:
+        return None
+    return Station(name, sensor, R, {k: v for k, v in numbers.items() if v is not None})
+
+
+def read_stations(file: Table, physics: Physics) -> list[Station | None]:
+    stations = [read_station(table, physics) for table in file.array("stations")]
+    seen: set[str] = set()
+    for i, station in enumerate(stations):
+        if station is not None and station.name in seen:
+            file.faults.add(f"stations[{i}].name", f"is {shown(station.name)}, which is also the name of another station")
+        seen |= {station.name} if station is not None else set()
+    return stations
+
+
+def read_parameters(table: Table, physics: Physics, model: Model | None) -> dict[str, Any]:
+    """Values of the parameters: numbers, or a Gaussian for those that are estimated or considered."""
+    roles = {p.name: p.role for p in model.parameters} if model else {}
+    return {name: _parameter(name, table, physics, roles.get(name, "")) for name in table.data}
+
+
+def _parameter(name: str, table: Table, physics: Physics, role: str) -> Any:
+    factor = physics.units.get(name, ONE).factor
+    if not isinstance(table.raw(name), Mapping):
+        return table.number(name, factor)
+    inner = table.table(name)
+    value = inner.number("value", factor)
+    if "value" not in inner:
+        inner.fault("value", "is missing")
+    spread = [key for key in SPREADS[:2] if key in inner]
+    role = inner.text("role", "fixed") or role
+    if role == "fixed" and spread:
+        inner.fault(spread[0], 'belongs to a parameter with role = "estimated" or "considered"; this one is fixed')
+    P = None if role == "fixed" else read_spread(inner, [name], [factor])
+    inner.finish(("role", "unit", *SPREADS[:2]))
+    return value if role == "fixed" or value is None or P is None else Gaussian([value], P)

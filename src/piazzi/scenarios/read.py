@@ -1,0 +1,90 @@
+"""Tables of a scenario file -> Scenario: one pass that reads, checks and converts, and collects every fault on its way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Truth
+from piazzi.problem.checks import Array
+from piazzi.scenarios.equations import read_physics
+from piazzi.scenarios.faults import Faults
+from piazzi.scenarios.integrators import read_integrator
+from piazzi.scenarios.quantities import read_noise, read_parameters, read_prior, read_stations
+from piazzi.scenarios.scenario import Picture, Scenario
+from piazzi.scenarios.table import Table
+from piazzi.scenarios.times import read_times
+from piazzi.scenarios.truth import read_truth
+from piazzi.scenarios.units import Units
+
+SECTIONS = (
+    "title", "units", "states", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise",
+    "integrator", "times", "truth", "picture",
+)  # fmt: skip
+MAX_STEPS = 10**10
+MAX_ROWS = 2 * 10**7
+
+
+def read_scenario(data: Mapping[str, Any], name: str, faults: Faults) -> Scenario | None:
+    """The scenario that the tables of a file describe, or None after noting every fault."""
+    file = Table(data, "", faults)
+    title, units = file.text("title", name), _units(file)
+    with np.errstate(all="ignore"):
+        problem = read_problem(file, name, units)
+        times = read_times(file.table("times"), units)
+        picture = Picture(file.table("picture").number("planet_radius", units.length(), positive=True))
+        file.table("picture").finish(("planet_radius",))
+        file.finish(SECTIONS)
+        if problem is not None and times is not None:
+            _check_size(problem, times, faults)
+    if faults or problem is None or times is None:
+        return None
+    return Scenario(name, title or name, problem, times, picture)
+
+
+def read_problem(file: Table, name: str, units: Units) -> Problem | None:
+    """The problem, or None after noting every fault."""
+    before = len(file.faults)
+    physics = read_physics(file, units)
+    parameters = read_parameters(file.table("parameters"), physics, physics.model)
+    stations: list[Station | None] = []
+    prior: Gaussian | None = None
+    noise: ProcessNoise | None = None
+    truth: Truth | None = None
+    prior_time = None
+    if physics.states:
+        stations = read_stations(file, physics)
+        prior, prior_time = read_prior(file.table("prior"), physics, file.table("truth"), units)
+        noise = read_noise(file.table("process_noise"), physics) if "process_noise" in file else None
+        truth = read_truth(file.table("truth"), physics, prior, units) if "truth" in file else None
+    if "stations" not in file:
+        file.fault("stations", "is missing: write [[stations]] with name, sensor and noise")
+    integrator = read_integrator(file.table("integrator"), units)
+    if len(file.faults) > before or physics.model is None or prior is None:
+        return None
+    with file.faults.at(""):
+        return Problem(
+            physics.model, prior, noise, [s for s in stations if s], parameters, integrator, prior_time, truth, name
+        )
+    return None
+
+
+def _units(file: Table) -> Units:
+    text = file.text("units")
+    if text is not None:
+        with file.faults.at("units"):
+            return Units.parse(text)
+    return Units()
+
+
+def _check_size(problem: Problem, times: Array, faults: Faults) -> None:
+    """Note a scenario that would take hours or all memory."""
+    rows = len(times) * len(problem.stations)
+    if rows > MAX_ROWS:
+        faults.add("times", f"makes {rows:g} measurements; at most {MAX_ROWS:g} are allowed")
+    with faults.at("prior.time" if problem.prior_time is not None else "integrator"):
+        steps = problem.intervals(times)[1].sum(dtype=float)
+        if steps > MAX_STEPS:
+            raise ValueError(f"makes {steps:g} steps in all; at most {MAX_STEPS:g} are allowed")

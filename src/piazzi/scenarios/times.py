@@ -1,0 +1,55 @@
+"""When a scenario is measured."""
+
+from __future__ import annotations
+
+from math import floor
+
+import numpy as np
+
+from piazzi.problem.checks import Array
+from piazzi.scenarios.table import Table
+from piazzi.scenarios.units import Units
+
+MAX_EPOCHS = 10**7
+
+
+def read_times(table: Table, units: Units) -> Array | None:
+    """Epochs in seconds, from start, step and count or stop, or from a list."""
+    if "list" in table:
+        value = table.raw("list")
+        times = table.vector("list", [f"time {i}" for i in range(len(value))] if isinstance(value, list) else ["time"])
+        table.finish()
+        return None if times is None else _increasing(table, times * units.time())
+    start = table.number("start")
+    step = table.number("step", positive=True)
+    count, stop = table.whole("count"), table.number("stop")
+    table.finish(("list",))
+    if "step" not in table or ("count" in table) == ("stop" in table):
+        table.fault("", "needs a step and either count or stop, or a list of times")
+        return None
+    if step is None or (count is None and stop is None):
+        return None
+    first = start or 0.0
+    if count is None and stop is not None:
+        if stop < first:
+            table.fault("stop", f"is {stop:g}, before the start at {first:g}")
+            return None
+        count = floor(min((stop - first) / step * (1 + 1e-12), 1e300)) + 1
+    assert count is not None
+    if count > MAX_EPOCHS:
+        table.fault("", f"makes {count:g} epochs; at most {MAX_EPOCHS:g} are allowed")
+        return None
+    return _increasing(table, (first + np.arange(count) * step) * units.time())
+
+
+def _increasing(table: Table, times: Array) -> Array | None:
+    if not times.size:
+        table.fault("list", "is empty")
+        return None
+    wrong = np.flatnonzero(~(np.diff(times) > 0))
+    if wrong.size or not np.isfinite(times).all():
+        i = int(wrong[0]) + 1 if wrong.size else 0
+        table.fault("", f"must increase: time {i} is {times[i]:g} s, after {times[i - 1]:g} s")
+        return None
+    times.setflags(write=False)
+    return times

@@ -1,0 +1,106 @@
+"""A problem as the tables of a scenario file, in SI: for formats that keep a problem beside its measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from piazzi.model import Model, Sensor
+from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Truth
+from piazzi.scenarios.faults import Faults, ScenarioError
+from piazzi.scenarios.integrators import write_integrator
+from piazzi.scenarios.read import read_problem
+from piazzi.scenarios.table import Table
+from piazzi.scenarios.units import Labels
+
+SECTIONS = ("states", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise", "integrator", "truth")
+
+
+def problem_to_tables(problem: Problem) -> dict[str, Any]:
+    """Plain tables, lists, numbers and text that `problem_from_tables` reads back to the same problem, bit for bit.
+
+    Raises
+    ------
+    ValueError
+        For a problem that the tables cannot hold, such as one with an integrator that has no name.
+    """
+    assert problem.integrator is not None
+    tables: dict[str, Any] = {
+        **_equations(problem.model),
+        "parameters": {p.name: _parameter(problem.parameters[p.name], p.role, problem.model.unit(p.name)) for p in problem.model.parameters},
+        "stations": [_station(s) for s in problem.stations],
+        "prior": {"mean": _listed(problem.prior.mean), "covariance": _listed(problem.prior.covariance)},
+        "process_noise": _noise(problem.process_noise),
+        "integrator": write_integrator(problem.integrator),
+    }
+    if problem.prior_time is not None:
+        tables["prior"]["time"] = float(problem.prior_time)
+    if problem.truth is not None:
+        tables["truth"] = _truth(problem.truth)
+    problem_from_tables(tables, problem.name, "the problem cannot be written to a file")
+    return tables
+
+
+def problem_from_tables(tables: Mapping[str, Any], name: str, source: str) -> Problem:
+    """The problem that `problem_to_tables` wrote, checked like any file; raises ScenarioError (a ValueError) with all faults."""
+    faults = Faults()
+    file = Table(tables, "", faults)
+    with np.errstate(all="ignore"):
+        problem = read_problem(file, name, Labels())
+    file.finish(SECTIONS)
+    if problem is None or faults:
+        raise ScenarioError(source, list(faults))
+    return problem
+
+
+def _equations(model: Model) -> dict[str, Any]:
+    return {
+        "states": {s: model.unit(s) for s in model.states},
+        "groups": {g: list(members) for g, members in model.groups},
+        "step" if model.discrete else "dynamics": dict(zip(model.states, model.dynamics, strict=True)),
+        "sensors": {s.name: _sensor(model, s) for s in model.sensors},
+    }
+
+
+def _sensor(model: Model, sensor: Sensor) -> dict[str, Any]:
+    rows = zip(sensor.components, sensor.equations, sensor.is_angle, dict(sensor.units).values(), strict=True)
+    return {
+        "numbers": dict.fromkeys(model.numbers(sensor), ""),
+        "components": {c: {"equation": e, "unit": unit, "angle": angle} for c, e, angle, unit in rows},
+    }
+
+
+def _parameter(value: Any, role: str, unit: str) -> dict[str, Any]:
+    if isinstance(value, Gaussian):
+        return {"value": float(value.mean[0]), "variance": float(value.covariance[0, 0]), "role": role, "unit": unit}
+    return {"value": float(value), "role": role, "unit": unit}
+
+
+def _station(station: Station) -> dict[str, Any]:
+    numbers = {k: float(v) for k, v in station.numbers.items()}
+    return {"name": station.name, "sensor": station.sensor, "noise": {"covariance": _listed(station.noise)}, "numbers": numbers}
+
+
+def _noise(noise: ProcessNoise) -> dict[str, Any]:
+    key = "covariance" if np.ndim(noise.covariance) == 2 else "variance"
+    return {key: _listed(noise.covariance), "per": noise.per, "method": noise.method}
+
+
+def _truth(truth: Truth) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        "parameters": {k: float(v) for k, v in truth.parameters.items()},
+        "measurement_noise": bool(truth.measurement_noise),
+    }
+    if truth.state is not None:
+        out["state"] = _listed(truth.state)
+    if truth.process_noise is not None:
+        out["process_noise"] = _noise(truth.process_noise)
+    if truth.integrator is not None:
+        out["integrator"] = write_integrator(truth.integrator)
+    return out
+
+
+def _listed(value: Any) -> Any:
+    return np.asarray(value, dtype=float).tolist()

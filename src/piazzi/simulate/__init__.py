@@ -1,0 +1,112 @@
+"""Draw a truth and measurements of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.problem import Gaussian, Problem, Tracking, Truth
+from piazzi.problem.checks import Array, finite_vector, numeric
+
+__all__ = ["simulate", "true_problem"]
+
+
+def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: Sequence[str] | None = None) -> Tracking:
+    """A tracking with truth, drawn from the problem (from its `truth` half where that says otherwise).
+
+    Parameters
+    ----------
+    problem : Problem
+    times : (K,) seconds, strictly increasing
+    rng : numpy.random.Generator
+        The same generator state gives the same bytes.  Draws, in order: first state, process noise, measurement noise.
+    stations : names, optional
+        Who measures, at every time; default all.
+
+    Raises
+    ------
+    ValueError
+        For bad times, unknown stations, or a truth that becomes infinite.
+    """
+    epochs = _checked_times(times)
+    truth_half = problem.truth or Truth()
+    actual = true_problem(problem)
+    index = np.array([problem.station_index(s) for s in (stations or [s.name for s in problem.stations])], dtype=np.int64)
+    if not index.size:
+        raise ValueError("the problem has no stations, so nothing can be measured")
+    K, n, M = len(epochs), problem.model.n, problem.model.width
+    first = _first_state(problem, actual, truth_half, rng)
+    w = rng.standard_normal((K, n))
+    v = rng.standard_normal((K * len(index), M))
+    start, count, scale = actual.intervals(epochs)
+    row_station, first_row = np.tile(index, K), np.arange(K + 1, dtype=np.int64) * len(index)
+    states, z = np.empty((K, n)), np.empty((K * len(index), M))
+    library = kernels.load(actual.spec("transition", actual.noise_fragment, "simulate"))
+    library.run_simulation(
+        K, epochs, start, count, scale, first_row, row_station, actual.station_sensor, actual.station_numbers, actual.given,
+        actual.process_noise.covariance, first, w, np.empty((n, n)), states, z,
+    )  # fmt: skip
+    if not np.isfinite(states).all():
+        k = int(np.argmin(np.isfinite(states).all(axis=1)))
+        raise ValueError(f"the simulated truth is not finite from epoch {k} (t = {epochs[k]:g} s); it started at {first}")
+    if truth_half.measurement_noise:
+        z += np.einsum("jab,jb->ja", np.linalg.cholesky(problem.station_noise)[row_station], v)
+    z = _wrapped(problem, row_station, z)
+    names = np.array([s.name for s in problem.stations])[row_station] if len(problem.stations) > 1 else None
+    return Tracking(np.repeat(epochs, len(index)), z, names, states)
+
+
+def true_problem(problem: Problem) -> Problem:
+    """The problem as it really is: with the parameters, process noise and integrator of its `truth` half."""
+    truth = problem.truth
+    if truth is None:
+        return problem
+    parameters = dict(problem.parameters)
+    for name, value in truth.parameters.items():
+        number = float(numeric(value, f"true value of parameter {name!r}"))
+        parameters[name] = Gaussian(number, 0.0) if isinstance(parameters.get(name), Gaussian) else number
+    return replace(
+        problem,
+        parameters=parameters,
+        process_noise=truth.process_noise or problem.process_noise,
+        integrator=truth.integrator or problem.integrator,
+        truth=None,
+    )
+
+
+def _first_state(problem: Problem, actual: Problem, truth: Truth, rng: np.random.Generator) -> Array:
+    """The true first state: as given, or drawn from the prior; estimated constants are drawn unless their truth is given."""
+    states = problem.model.states
+    n, nd = problem.model.n, len(states)
+    draw = rng.standard_normal(n)
+    values, vectors = np.linalg.eigh(actual.covariance)
+    x = actual.mean + vectors @ (np.sqrt(np.maximum(values, 0.0)) * (vectors.T @ draw))
+    if truth.state is not None:
+        x[:nd] = finite_vector(truth.state, nd, "true state", states)
+    return np.ascontiguousarray(x)
+
+
+def _checked_times(times: Any) -> Array:
+    out = np.ascontiguousarray(numeric(times, "times").reshape(-1))
+    if not out.size:
+        raise ValueError("there are no times to simulate")
+    if not np.isfinite(out).all():
+        raise ValueError(f"time {int(np.argmin(np.isfinite(out)))} is not finite")
+    down = np.flatnonzero(np.diff(out) <= 0)
+    if down.size:
+        k = int(down[0]) + 1
+        raise ValueError(f"times must increase: time {k} is {out[k]:g} s, after {out[k - 1]:g} s")
+    return out
+
+
+def _wrapped(problem: Problem, row_station: Array, z: Array) -> Array:
+    """Angle components brought into (-pi, pi]."""
+    angle = np.zeros((len(problem.stations), z.shape[1]), dtype=bool)
+    for s, station in enumerate(problem.stations):
+        marks = problem.model.sensor(station.sensor).is_angle
+        angle[s, : len(marks)] = marks
+    return np.where(angle[row_station], z - 2 * np.pi * np.ceil((z - np.pi) / (2 * np.pi)), z)

@@ -1,0 +1,29 @@
+"""Surroundings of every test: a kernel cache of its own, and the recordings that the project does not contain."""
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+ROOT = Path(__file__).resolve().parent.parent
+
+# Set before anything imports piazzi, and inherited by the programs that tests start.  Kept between runs, because a kernel
+# takes seconds to compile; safe to keep, because its hash covers all that it was made from.
+CACHE = ROOT / ".cache" / "tests"
+CACHE.mkdir(mode=0o700, parents=True, exist_ok=True)
+os.environ["PIAZZI_CACHE"] = str(CACHE)
+os.environ["MPLBACKEND"] = "Agg"
+
+# No deadline: a first call may compile.  In CI the same commit draws the same examples.
+settings.register_profile("piazzi", deadline=None, derandomize="CI" in os.environ)
+settings.load_profile("piazzi")
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """Folder of the recordings: `PIAZZI_DATA`, else `../shared/data` from the repository root; skips where there is none."""
+    folder = Path(os.environ.get("PIAZZI_DATA") or ROOT.parent / "shared" / "data")
+    if not folder.is_dir():
+        pytest.skip(f"no recordings at {folder}: PIAZZI_DATA names their folder")
+    return folder

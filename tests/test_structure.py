@@ -1,0 +1,81 @@
+"""The direction of flow: a stage imports from itself and from the stages before it, and all of them reach the wheel."""
+
+import ast
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+SOURCE = ROOT / "src"
+MODULES = sorted(SOURCE.glob("piazzi/**/*.py"))
+
+# Upstream first; stages on one line may import each other.  `__init__` is the public face, made of what is above it.
+STAGES = """
+expressions
+model
+kernels
+problem tracking
+scenarios
+simulate
+estimate
+io load
+evaluate
+present
+__init__
+cli
+__main__
+"""
+RANK = {stage: rank for rank, line in enumerate(STAGES.split("\n")) for stage in line.split()}
+
+
+def stage_of(module: Path) -> str:
+    """Name of the folder or file directly below `piazzi` that `module` belongs to."""
+    return module.relative_to(SOURCE / "piazzi").parts[0].removesuffix(".py")
+
+
+def stages_imported(module: Path) -> Iterator[tuple[int, str]]:
+    """Line and stage of every import from piazzi; `piazzi.Problem` is no stage of its own but belongs to the public face."""
+    package = module.relative_to(SOURCE).parent.parts
+    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            parent: tuple[str, ...] = ()
+        elif isinstance(node, ast.ImportFrom):
+            parent = (*package[: len(package) - node.level + 1 if node.level else 0], *(node.module or "").split("."))
+        else:
+            continue
+        for alias in node.names:
+            root, stage, *_ = *filter(None, parent), *alias.name.split("."), ""
+            if root == "piazzi":
+                yield node.lineno, stage if stage in RANK else "__init__"
+
+
+def test_every_stage_has_a_place_in_the_order():
+    assert MODULES
+    assert {stage_of(module) for module in MODULES} <= RANK.keys()
+
+
+def test_imports_point_upstream():
+    wrong = [
+        f"{module.relative_to(ROOT)}:{line}: {stage_of(module)} imports from {stage}, which is downstream"
+        for module in MODULES
+        for line, stage in stages_imported(module)
+        if RANK[stage] > RANK.get(stage_of(module), len(STAGES))
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.slow
+def test_wheel_carries_every_file_of_the_package(tmp_path):
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", tmp_path], cwd=ROOT, check=True, capture_output=True
+    )
+    with zipfile.ZipFile(*tmp_path.glob("*.whl")) as wheel:
+        packed = set(wheel.namelist())
+    files = {
+        f.relative_to(SOURCE).as_posix() for f in SOURCE.glob("piazzi/**/*") if f.is_file() and "__pycache__" not in f.parts
+    }
+    assert files <= packed
