@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import Unavailable
+from figures import UnavailableError
 from floor import Floor
 
 import piazzi as pz
@@ -25,7 +25,7 @@ def recording() -> Path:
     folder = Path(os.environ.get("PIAZZI_DATA") or ROOT.parent / "shared" / "data")
     path = folder / "satellite" / "slide_example.npz"
     if not path.is_file():
-        raise Unavailable(f"no {path}; set PIAZZI_DATA")
+        raise UnavailableError(f"no {path}; set PIAZZI_DATA")
     return path
 
 
@@ -35,7 +35,7 @@ def floor() -> Floor:
     try:
         return Floor(recording())
     except FileNotFoundError as error:
-        raise Unavailable(f"the floor needs gcc ({error})") from None
+        raise UnavailableError(f"the floor needs gcc ({error})") from None
 
 
 def variants(count: int, **changes: Any) -> list[Case]:
@@ -62,6 +62,21 @@ def long_runs(epochs: int, count: int = 1) -> list[Case]:
     problem = replace(problem, truth=pz.Truth(state=problem.prior.mean))
     dt = float(tracking.times[1] - tracking.times[0])
     return [(problem, pz.simulate(problem, np.arange(epochs) * dt, np.random.default_rng(seed))) for seed in range(count)]
+
+
+def solved() -> tuple[Any, Any]:
+    """A chain of states linearised and solved at the solution of the full graph, and its solver."""
+    from piazzi.estimate.chain import Chain, CovarianceSolver
+    from piazzi.estimate.factor_graph import FactorGraph
+    from piazzi.estimate.inputs import prepare
+
+    problem, tracking = pz.load(recording())
+    chain = Chain(problem, prepare(problem, tracking))
+    chain.x[:] = FactorGraph().estimate(problem, tracking).mean
+    chain.linearize()
+    solver = CovarianceSolver(chain)
+    solver.solve(0.0)
+    return chain, solver
 
 
 def calls(estimator: Any, cases: list[Case]) -> list[Any]:

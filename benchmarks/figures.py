@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -12,7 +11,7 @@ from typing import Any, Literal
 TOLERANCE = 0.15  # on a shared machine, medians of interleaved runs move by this much
 
 
-class Unavailable(Exception):
+class UnavailableError(Exception):
     """What a section needs is not there: a command, a library, a data file."""
 
 
@@ -52,15 +51,10 @@ Section = Callable[[], Iterator[Figure]]
 
 
 def cpu_seconds(run: Callable[[], Any]) -> float:
-    """CPU seconds of the process, all threads, for one call; the collector stays out of it."""
-    gc.collect()
-    gc.disable()
-    try:
-        started = time.process_time()
-        run()
-        return time.process_time() - started
-    finally:
-        gc.enable()
+    """CPU seconds of the process, all threads, for one call."""
+    started = time.process_time()
+    run()
+    return time.process_time() - started
 
 
 def interleaved(ours: list[Callable[[], Any]], other: Callable[[], float]) -> tuple[float, float]:

@@ -20,9 +20,9 @@ model
 kernels
 problem tracking
 scenarios
-simulate
+simulation
 estimate
-io load
+io loading
 evaluate
 present
 __init__

@@ -1,4 +1,4 @@
-"""The estimators written by hand in C for one problem, the 2-D bearing-only satellite: the floor that Piazzi is measured against.
+"""The floor that Piazzi is measured against: estimators written by hand in C for one problem, the bearing-only satellite.
 
 Adopted from the measurements that came before Piazzi; ``floor.c`` is as it was then.  Dynamics: 15 substeps of 1 s of the
 second-order Taylor step (`rk4`: 10 substeps of RK4); process noise Q dt per step; the first measurement is used.  Graph and
@@ -30,10 +30,9 @@ class Floor:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.lib = build()
         with np.load(path) as file:
-            self.z, self.x0, self.P0, Q, dt = (np.ascontiguousarray(file[key], dtype=float) for key in ("meas", "x0", "P0", "Q", "dt"))
-            self.R = float(file["R"])
-        self.z, self.Q = self.z.ravel(), Q * dt
-        self.K = len(self.z)
+            self.z, self.x0, self.P0 = (np.ascontiguousarray(file[key], dtype=float) for key in ("meas", "x0", "P0"))
+            self.Q, self.R = np.ascontiguousarray(file["Q"] * file["dt"]), float(file["R"])
+        self.K = self.z.size
         self.workspace = ctypes.c_void_p(self.lib.ws_new(self.K))
 
     def ekf(self, rk4: bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -44,18 +43,16 @@ class Floor:
 
     def graph(self, iterations: int = 4) -> tuple[np.ndarray, np.ndarray]:
         """Means and marginal covariances of the full graph from the EKF (covariances as P - P Lambda P, good to 1e-4)."""
-        x, P = self._states(), np.zeros((self.K, 4, 4))
-        start = self._start()
-        self.lib.bench_fg0(1, self.workspace, self.K, _pointer(start), _pointer(x), *self._problem(), iterations, _pointer(P), 1)
+        x, P, start = self._states(), np.zeros((self.K, 4, 4)), self._start()
+        states = _pointer(start), _pointer(x)
+        self.lib.bench_fg0(1, self.workspace, self.K, *states, *self._problem(), iterations, _pointer(P), 1)
         return x[: self.K], P
 
     def window(self, lag: int = 100, iterations: int = 1) -> tuple[np.ndarray, np.ndarray]:
         """Means (K, 4) of the newest and of the oldest state of the sliding window."""
-        newest, oldest = np.zeros((2 * (self.K + PADDING), 4)), np.zeros((self.K, 4))
-        states = self._states()
-        self.lib.fixedlag(
-            self.workspace, self.K, *self._problem(), lag, iterations, 1, 0, _pointer(states), _pointer(newest), None, _pointer(oldest), 0
-        )
+        states, newest, oldest = self._states(), np.zeros((2 * (self.K + PADDING), 4)), np.zeros((self.K, 4))
+        results = _pointer(states), _pointer(newest), None, _pointer(oldest)
+        self.lib.fixedlag(self.workspace, self.K, *self._problem(), lag, iterations, 1, 0, *results, 0)
         return newest[: self.K], oldest
 
     def seconds(self, what: str, repeats: int = 7, *, lag: int = 100, iterations: int | None = None) -> float:
@@ -74,19 +71,20 @@ class Floor:
             return self.lib.bench_fl(1, self.workspace, self.K, *problem, lag, iterations or 1, 1, 0, *results) * self.K * 1e-6
         start = self._start()
         if what == "graph":  # the EKF start, the iterations, and the marginal covariances
-            ekf = self._seconds_once("ekf", lag, None)
-            states = _pointer(start), _pointer(x)
-            return ekf + 1e-3 * self.lib.bench_fg0(3, self.workspace, self.K, *states, *problem, iterations or 4, _pointer(P), 1)
+            ekf, states = self._seconds_once("ekf", lag, None), (_pointer(start), _pointer(x))
+            return ekf + 1e-3 * self.lib.bench_fg0(
+                3, self.workspace, self.K, *states, *problem, iterations or 4, _pointer(P), 1
+            )
         self.graph()  # leaves the workspace linearised and solved
-        return 1e-6 * self.lib.bench_part(_PARTS[what], 10, self.workspace, self.K, _pointer(start), *problem, _pointer(P), _pointer(x))
+        run = self.workspace, self.K, _pointer(start), *problem, _pointer(P), _pointer(x)
+        return 1e-6 * self.lib.bench_part(_PARTS[what], 10, *run)
 
-    def monte_carlo_runs_per_second(self, rng: np.random.Generator, runs: int = 1000, threads: int = 1, simd: bool = True) -> float:
+    def monte_carlo_runs_per_second(self, rng: np.random.Generator, runs: int = 1000, threads: int = 1) -> float:
         """Whole EKF runs per second of wall-clock time, eight runs to a vector."""
-        z = (self.z + rng.normal(size=(runs, self.K)) * 1e-4 + np.pi) % (2 * np.pi) - np.pi
-        z = np.ascontiguousarray(z.T if simd else z)
+        z = np.ascontiguousarray(((self.z + rng.normal(size=(runs, self.K)) * 1e-4 + np.pi) % (2 * np.pi) - np.pi).T)
         x0 = np.ascontiguousarray(self.x0 + rng.normal(size=(runs, 4)) * [1e5, 1e5, 50, 50])
         out, noise = np.zeros((runs, 4)), (_pointer(self.P0), _pointer(self.Q), _real(self.R))
-        arguments = runs, self.K, _pointer(z), _pointer(x0), *noise, _pointer(out), int(simd), threads
+        arguments = runs, self.K, _pointer(z), _pointer(x0), *noise, _pointer(out), 1, threads
         return statistics.median(self.lib.mc(*arguments) for _ in range(3))
 
     def _problem(self) -> tuple[Any, ...]:

@@ -6,23 +6,35 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from piazzi.estimate import Estimate, ExtendedKalmanFilter, Prediction, Updated, predict, update
+    from piazzi.estimate import (
+        Estimate,
+        ExtendedKalmanFilter,
+        FactorGraph,
+        LiveFilter,
+        LiveWindow,
+        Prediction,
+        SlidingWindow,
+        Updated,
+        predict,
+        update,
+    )
     from piazzi.evaluate import Comparison, compare
     from piazzi.kernels import Discrete, Integrator, RungeKutta4, Taylor
-    from piazzi.load import load
+    from piazzi.loading import load
     from piazzi.model import Model, Parameter, Sensor
     from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Tracking, Truth
-    from piazzi.simulate import simulate
+    from piazzi.simulation import simulate
 
 # name -> module; nothing is imported before it is used
 _WHERE = {
     **dict.fromkeys(("Model", "Parameter", "Sensor"), "piazzi.model"),
     **dict.fromkeys(("Discrete", "Integrator", "RungeKutta4", "Taylor"), "piazzi.kernels"),
     **dict.fromkeys(("Gaussian", "Problem", "ProcessNoise", "Station", "Tracking", "Truth"), "piazzi.problem"),
-    **dict.fromkeys(("Estimate", "ExtendedKalmanFilter", "Prediction", "Updated", "predict", "update"), "piazzi.estimate"),
+    **dict.fromkeys(("Estimate", "ExtendedKalmanFilter", "FactorGraph", "LiveFilter", "LiveWindow"), "piazzi.estimate"),
+    **dict.fromkeys(("Prediction", "SlidingWindow", "Updated", "predict", "update"), "piazzi.estimate"),
     **dict.fromkeys(("Comparison", "compare"), "piazzi.evaluate"),
-    "simulate": "piazzi.simulate",
-    "load": "piazzi.load",
+    "simulate": "piazzi.simulation",
+    "load": "piazzi.loading",
 }
 
 __version__ = "0.1.0"
@@ -31,8 +43,11 @@ __all__ = [
     "Discrete",
     "Estimate",
     "ExtendedKalmanFilter",
+    "FactorGraph",
     "Gaussian",
     "Integrator",
+    "LiveFilter",
+    "LiveWindow",
     "Model",
     "Parameter",
     "Prediction",
@@ -40,6 +55,7 @@ __all__ = [
     "ProcessNoise",
     "RungeKutta4",
     "Sensor",
+    "SlidingWindow",
     "Station",
     "Taylor",
     "Tracking",

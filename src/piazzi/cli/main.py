@@ -1,50 +1,21 @@
-"""The ``piazzi`` command: finds the other commands, each in the file of its name, when they are called."""
+"""Where the command line starts.  Nothing is imported before Ctrl-C is in good hands."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from importlib import import_module
+import sys
 
-import click
-
-from piazzi import __version__
-from piazzi.cli.running import run
-
-COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare")
-
-
-class Commands(click.Group):
-    """A group whose commands are imported when somebody asks for them."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = import_module(f"piazzi.cli.{cmd_name}").command
-        return command
-
-
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
-@click.version_option(__version__, "-V", "--version", message="%(prog)s %(version)s")
-def piazzi() -> None:
-    """Orbits from tracking data: several estimators side by side, and which of them to trust.
-
-    SOURCE is a recording (.npz, .nc, or .csv with --scenario), the name of a built-in scenario, a scenario file (.toml), or - for
-    standard input.
-
-    \b
-    Examples:
-      piazzi demo -o demo                       a first look: tables and pictures
-      piazzi estimate tracking.npz              the orbit, and how sure it is
-      piazzi compare b612-range --with ekf --with graph
-      piazzi scenarios list                     what is built in
-
-    Exit status: 0 done, 2 bad usage or input, 3 an estimator did not succeed.
-    """
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
-    return run(piazzi, arguments)
+    try:
+        from piazzi.cli.commands import piazzi
+        from piazzi.cli.running import run
+
+        return run(piazzi, arguments)
+    except KeyboardInterrupt:
+        sys.stderr.write("piazzi: interrupted\n")
+        return 130

@@ -11,7 +11,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 source = click.argument("source", metavar="SOURCE")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, and nothing else there.")
-seed = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed where a scenario is simulated.")
+seed = click.option("--seed", type=click.IntRange(0), metavar="N", default=0, show_default=True, help="Seed of simulation.")
 scenario = click.option("--scenario", metavar="NAME", help="Scenario that a .csv or the CSV on standard input measures.")
 
 
@@ -24,10 +24,31 @@ def estimators(default: str) -> Callable[[F], F]:
 
 def output(what: str) -> Callable[[F], F]:
     """Option -o, naming the file that the command writes."""
-    return click.option("-o", "--output", metavar="FILE", help=what)
+    return click.option("-o", "--output", "output_file", metavar="FILE", help=what)
 
 
-class WithEstimators(click.Command):
+class Command(click.Command):
+    """A command whose docstring may have a paragraph of examples, which keeps its lines in the help."""
+
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        self.help = keep_examples(self.help)
+        super().format_help_text(ctx, formatter)
+
+
+class Group(click.Group):
+    """The same for a group of commands."""
+
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        self.help = keep_examples(self.help)
+        super().format_help_text(ctx, formatter)
+
+
+def keep_examples(text: str | None) -> str:
+    """Help text that click does not fill where examples begin."""
+    return (text or "").replace("\n\nExamples:", "\n\n\b\nExamples:")
+
+
+class WithEstimators(Command):
     """A command whose help ends with the estimators that there are."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

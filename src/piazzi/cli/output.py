@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -56,29 +56,45 @@ def check_output(path: str | None, endings: Sequence[str]) -> None:
     click.UsageError
         For an ending that is not one of `endings`.
     OSError
-        Where the folder is missing or nothing can be written there.
+        Where nothing can be written there.
     """
     if path is None or path == STDOUT:
         return
-    target = Path(path)
-    if target.suffix.lower() not in endings:
+    if Path(path).suffix.lower() not in endings:
         raise click.UsageError(f"-o {path}: the file must end in {', '.join(endings)}", click.get_current_context(silent=True))
-    if target.is_dir():
-        raise IsADirectoryError(0, "it is a folder, not a file", path)
-    if target.exists() and not os.access(target, os.W_OK):
-        raise PermissionError(0, "it exists and cannot be written", path)
-    check_folder(target.parent, path)
+    from piazzi.io.atomic import check_writable
+
+    check_writable(path)
+    target = os.path.realpath(path)
+    if not os.path.exists(target) or os.path.isfile(target):
+        try:
+            with tempfile.NamedTemporaryFile(dir=os.path.dirname(target), prefix=".piazzi-"):
+                pass  # some folders refuse files whatever their permissions say
+        except OSError as error:
+            raise type(error)(error.errno, f"cannot be written: {error.strerror}", path) from None
 
 
-def check_folder(folder: Path, path: str) -> None:
-    """Raise OSError unless files can be made in the folder."""
-    if not folder.is_dir():
-        raise FileNotFoundError(0, f"there is no folder {str(folder)!r}" if not folder.exists() else f"{str(folder)!r} is not a folder", path)
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise type(error)(error.errno, f"cannot be written: {error.strerror}", path) from None
+def write_json(path: str, value: Any) -> None:
+    """Strict JSON into a file, all at once, or on stdout for "-"."""
+    if path == STDOUT:
+        print_json(value)
+        return
+    from piazzi.io.atomic import atomic_path
+
+    with atomic_path(path) as work:
+        work.write_text(json.dumps(value, allow_nan=False, indent=1) + "\n", encoding="utf-8")
+
+
+def write_csv(path: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Rows with the same keys as CSV, None as an empty cell, all at once."""
+    import csv
+
+    from piazzi.io.atomic import atomic_path
+
+    with atomic_path(path) as work, open(work, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]) if rows else [])
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 @contextmanager

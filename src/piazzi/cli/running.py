@@ -8,6 +8,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import click
@@ -38,8 +39,8 @@ def _guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
             status = command.main(arguments, prog_name="piazzi", standalone_mode=False)
             if sys.stdout is not None:
                 sys.stdout.flush()
-        except click.Abort as error:
-            raise KeyboardInterrupt from error
+        except click.Abort as error:  # click's name for Ctrl-C, and for the end of a file
+            raise error.__cause__ or KeyboardInterrupt from None
         return status if isinstance(status, int) else DONE
     except KeyboardInterrupt:
         say("interrupted")
@@ -63,13 +64,13 @@ def _told(error: Exception) -> tuple[int, str]:
     match error:
         case NoArgsIsHelpError():
             click.echo(error.format_message(), err=True)
-            return BAD_INPUT, f"a command is missing: piazzi {error.ctx.command.list_commands(error.ctx)[0]}, for example" if isinstance(
-                error.ctx.command, click.Group
-            ) else "arguments are missing"
+            return BAD_INPUT, "no command given"
         case click.UsageError():
             path = error.ctx.command_path if error.ctx else "piazzi"
             where = path.removeprefix("piazzi").strip()
-            return BAD_INPUT, f"{where + ': ' if where else ''}{error.format_message().rstrip('.')} (see {path} --help)"
+            text = error.format_message().rstrip(".")
+            text = text[:1].lower() + text[1:]
+            return BAD_INPUT, f"{where + ': ' if where else ''}{text} (see {path} --help)"
         case click.ClickException():
             return BAD_INPUT, error.format_message()
         case OSError():
@@ -89,10 +90,9 @@ def say(message: str, *, prefix: str = "piazzi: ") -> None:
     text = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
     if len(text) > _LONGEST:
         text = text[: _LONGEST - 4] + " ..."
-    try:
-        print(prefix + text, file=sys.stderr, flush=True)  # noqa: T201
-    except (OSError, ValueError):  # nobody listens any more
-        pass
+    with suppress(OSError, ValueError, AttributeError):  # where nobody listens any more
+        sys.stderr.write(f"{prefix}{text}\n")
+        sys.stderr.flush()
 
 
 def _prepare_streams() -> None:
@@ -104,15 +104,13 @@ def _prepare_streams() -> None:
 
 def _abandon_stdout() -> None:
     """Send what is still buffered nowhere, so that the interpreter's last flush cannot fail too."""
-    try:
+    with suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
-    except (OSError, ValueError, AttributeError):
-        pass
 
 
-def _show_warning(message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None) -> None:
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     say(f"warning: {message}")
 
 

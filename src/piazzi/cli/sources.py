@@ -19,20 +19,26 @@ _STARTS = {b"PK": ".npz", b"\x89HDF": ".nc", b"CDF": ".nc"}
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A problem with its tracking, and the name to report them by."""
+    """A problem with its tracking, the name to report them by, and whether they were recorded rather than simulated."""
 
     problem: Problem
     tracking: Tracking
     name: str
+    recorded: bool
 
 
 def load_source(source: str, seed: int, scenario: str | None = None) -> Source:
-    """What `piazzi.load` makes of a source, or of standard input for "-"; raises as that does."""
-    from piazzi.load import load
+    """What `piazzi.loading` makes of a source, or of standard input for "-"; raises as that does."""
+    from piazzi import load
+    from piazzi.io.files import RECORDINGS
 
+    if not source:
+        raise click.UsageError("SOURCE is empty", click.get_current_context(silent=True))
+    if source.lower().endswith(".csv") and not scenario:
+        raise click.UsageError(f"{source}: --scenario NAME says what it measures", click.get_current_context(silent=True))
     if source != STDIN:
         problem, tracking = load(source, seed=seed, scenario=scenario)
-        return Source(problem, tracking, os.path.basename(source) or source)
+        return Source(problem, tracking, os.path.basename(source) or source, source.lower().endswith(RECORDINGS))
     path = _spooled(scenario)
     try:
         problem, tracking = load(path, seed=seed, scenario=scenario)
@@ -41,7 +47,7 @@ def load_source(source: str, seed: int, scenario: str | None = None) -> Source:
         raise ValueError(text.replace(str(path), "standard input")) from None
     finally:
         path.unlink(missing_ok=True)
-    return Source(problem, tracking, STDIN)
+    return Source(problem, tracking, STDIN, path.suffix in RECORDINGS)
 
 
 def _spooled(scenario: str | None) -> Path:

@@ -1,6 +1,22 @@
 """Estimators: frozen settings with one verb, ``estimate(problem, tracking) -> Estimate``."""
 
 from piazzi.estimate.estimator import Estimate, Estimator
+from piazzi.estimate.factor_graph import FactorGraph
 from piazzi.estimate.kalman import ExtendedKalmanFilter, Prediction, Updated, predict, update
+from piazzi.estimate.live import LiveFilter
+from piazzi.estimate.live_window import LiveWindow
+from piazzi.estimate.sliding_window import SlidingWindow
 
-__all__ = ["Estimate", "Estimator", "ExtendedKalmanFilter", "Prediction", "Updated", "predict", "update"]
+__all__ = [
+    "Estimate",
+    "Estimator",
+    "ExtendedKalmanFilter",
+    "FactorGraph",
+    "LiveFilter",
+    "LiveWindow",
+    "Prediction",
+    "SlidingWindow",
+    "Updated",
+    "predict",
+    "update",
+]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -21,9 +21,18 @@ def chain_fragments(problem: Problem, *last: str) -> tuple[str, ...]:
     """Fragments of every estimator that works on a chain of states."""
     kind = problem.noise_fragment.removeprefix("noise_")
     return (
-        "transition", problem.noise_fragment, f"linearize_{kind}", "decorrelate", "linearize", "update_components", "epoch", "innovations",
-        "chain", "marginals", *last,
-    )  # fmt: skip
+        "transition",
+        problem.noise_fragment,
+        f"linearize_{kind}",
+        "decorrelate",
+        "linearize",
+        "update_components",
+        "epoch",
+        "innovations",
+        "chain",
+        "marginals",
+        *last,
+    )
 
 
 def tether_of(problem: Problem) -> Array:
@@ -52,10 +61,29 @@ class Chain:
     def _bind_linearize(self) -> Callable[[], None]:
         i, p, N, M = self.inputs, self.problem, self.problem.model.n, self.problem.model.width
         bound: Callable[[], None] = self.library.graph_linearize.bind(
-            i.epochs, i.t, i.count, i.scale, *i.measured(p), p.given, p.process_noise.covariance, p.mean, p.covariance, self.x, self.f,
-            self.Phi, self.Q_all, self.nu, self.H, np.empty(M * (M + N)), self.tether, np.empty((N, N)), np.empty(N), np.empty(N),
-            self.broken, self.report,
-        )  # fmt: skip
+            i.epochs,
+            i.t,
+            i.count,
+            i.scale,
+            *i.measured(p),
+            p.given,
+            p.process_noise.covariance,
+            p.mean,
+            p.covariance,
+            self.x,
+            self.f,
+            self.Phi,
+            self.Q_all,
+            self.nu,
+            self.H,
+            np.empty(M * (M + N)),
+            self.tether,
+            np.empty((N, N)),
+            np.empty(N),
+            np.empty(N),
+            self.broken,
+            self.report,
+        )
         return bound
 
     def linearize(self) -> float:
@@ -74,7 +102,17 @@ class Chain:
         i, M, N = self.inputs, self.problem.model.width, self.problem.model.n
         nu, S = np.empty((len(i.z), M)), np.empty((len(i.z), M, M))
         self.library.graph_innovations(
-            i.epochs, i.t, *i.measured(self.problem), self.problem.given, self.x, self.d_pred, self.P_pred, np.empty(M), np.empty((M, N)), nu, S
+            i.epochs,
+            i.t,
+            *i.measured(self.problem),
+            self.problem.given,
+            self.x,
+            self.d_pred,
+            self.P_pred,
+            np.empty(M),
+            np.empty((M, N)),
+            nu,
+            S,
         )
         return nu, S
 
@@ -95,7 +133,7 @@ class Solver(Protocol):
 
 
 class CovarianceSolver:
-    """Linearised Kalman filter forward, Bryson-Frazier back, covariances by Rauch-Tung-Striebel in Joseph form."""
+    """Linearised Kalman filter forward, Bryson-Frazier back; covariances from before and after each state, in Joseph form."""
 
     name = "chain"
 
@@ -108,9 +146,28 @@ class CovarianceSolver:
     def solve(self, damping: float) -> None:
         c, i, p = self.chain, self.chain.inputs, self.chain.problem
         c.library.graph_solve(
-            i.epochs, i.scale, i.first_row, p.process_noise.covariance, p.mean, p.covariance, c.x, c.f, c.Phi, c.Q_all, c.nu, c.H, c.tether,
-            float(damping), c.d_pred, c.P_pred, self.P_last, self.gains, c.multiplier, c.dx, c.report,
-        )  # fmt: skip
+            i.epochs,
+            i.scale,
+            i.first_row,
+            p.process_noise.covariance,
+            p.mean,
+            p.covariance,
+            c.x,
+            c.f,
+            c.Phi,
+            c.Q_all,
+            c.nu,
+            c.H,
+            c.tether,
+            float(damping),
+            c.d_pred,
+            c.P_pred,
+            self.P_last,
+            self.gains,
+            c.multiplier,
+            c.dx,
+            c.report,
+        )
 
     def marginals(self) -> Array:
         return self._marginals(np.empty((1, 1)), keep_cross=False)
@@ -125,9 +182,24 @@ class CovarianceSolver:
         c, i, N = self.chain, self.chain.inputs, self.chain.problem.model.n
         covariance = np.empty((i.epochs, N, N))
         c.library.graph_marginals(
-            i.epochs, i.scale, i.first_row, c.problem.process_noise.covariance, c.Phi, c.Q_all, c.nu, c.H, c.P_pred, self.P_last,
-            np.empty((N, N)), np.empty((N, N)), int(keep_cross), c.dx, covariance, cross, c.report,
-        )  # fmt: skip
+            i.epochs,
+            i.scale,
+            i.first_row,
+            c.problem.process_noise.covariance,
+            c.Phi,
+            c.Q_all,
+            c.nu,
+            c.H,
+            c.P_pred,
+            self.P_last,
+            np.empty((N, N)),
+            np.empty((N, N)),
+            int(keep_cross),
+            c.dx,
+            covariance,
+            cross,
+            c.report,
+        )
         return covariance
 
 
@@ -159,9 +231,31 @@ class InformationSolver:
     def _solve(self, damping: float, cross: Array, keep_cross: bool) -> None:
         c, i, p = self.chain, self.chain.inputs, self.chain.problem
         self.library.graph_solve_information(
-            i.epochs, i.scale, i.first_row, p.process_noise.covariance, p.mean, self.root, c.x, c.f, c.Phi, c.Q_all, c.nu, c.H, c.tether,
-            float(damping), *self.space, *self.noise, c.d_pred, c.P_pred, c.multiplier, c.dx, self.covariance, int(keep_cross), cross, c.report,
-        )  # fmt: skip
+            i.epochs,
+            i.scale,
+            i.first_row,
+            p.process_noise.covariance,
+            p.mean,
+            self.root,
+            c.x,
+            c.f,
+            c.Phi,
+            c.Q_all,
+            c.nu,
+            c.H,
+            c.tether,
+            float(damping),
+            *self.space,
+            *self.noise,
+            c.d_pred,
+            c.P_pred,
+            c.multiplier,
+            c.dx,
+            self.covariance,
+            int(keep_cross),
+            cross,
+            c.report,
+        )
 
     def marginals(self) -> Array:
         return self.covariance.copy()

@@ -95,7 +95,7 @@ class Estimate:
 
     def to_dataset(self) -> xarray.Dataset:
         """Times, means, covariances and innovations as a labelled dataset with units."""
-        from piazzi.io.netcdf import estimate_to_dataset
+        from piazzi.estimate.dataset import estimate_to_dataset
 
         return estimate_to_dataset(self)
 
@@ -116,4 +116,4 @@ def semidefinite(P: Array, tolerance: float = 1e-8) -> Array:
         good &= (pivot >= -tolerance) & (firm | (np.abs(column) <= 10 * np.sqrt(tolerance)).all(axis=1))
         step = np.where(firm, 1.0 / np.where(firm, pivot, 1.0), 0.0)
         C[:, j + 1 :, j + 1 :] -= column[:, :, None] * column[:, None, :] * step[:, None, None]
-    return good
+    return np.asarray(good)

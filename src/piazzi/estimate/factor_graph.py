@@ -83,9 +83,19 @@ class FactorGraph:
         if self.cross_covariances and not outcome.failure:
             details["cross_covariances"] = solver.cross()[skip:]
         return Estimate(
-            problem, tracking, chain.x[skip:], outcome.covariance[skip:], nu, S, outcome.iterations, watch.seconds(), "delayed", None, details,
+            problem,
+            tracking,
+            chain.x[skip:],
+            outcome.covariance[skip:],
+            nu,
+            S,
+            outcome.iterations,
+            watch.seconds(),
+            "delayed",
+            None,
+            details,
             outcome.failure,
-        )  # fmt: skip
+        )
 
     def _optimize(self, chain: Chain, inputs: Inputs, tracking: Tracking) -> tuple[Outcome, Solver, str]:
         """Optimise from the start asked for; the outcome, its solver, and the starts used.
@@ -104,7 +114,9 @@ class FactorGraph:
         second = self._run(chain, solver, "window", inputs, tracking)
         return replace(second, iterations=first.iterations + second.iterations), solver, f"{used}, then window"
 
-    def _run(self, chain: Chain, solver: Solver, start: Any, inputs: Inputs, tracking: Tracking, narrow: bool = False) -> Outcome:
+    def _run(
+        self, chain: Chain, solver: Solver, start: Any, inputs: Inputs, tracking: Tracking, narrow: bool = False
+    ) -> Outcome:
         states = with_first(chain, self._begin(start, chain.problem, tracking, inputs))
         check = narrow and InformationSolver.applies(chain.problem)
         return optimize(chain, solver, states, self.max_iterations, self.tolerance, DIFFUSE if check else np.inf)

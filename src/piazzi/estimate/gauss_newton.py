@@ -31,8 +31,8 @@ def optimize(
 
     A step that raises the merit is damped as much as it takes (Levenberg-Marquardt, scaled by the prior), except the first.
     The merit is the cost, and for directions without noise, where the dynamics must hold, twice the defect at the price of
-    its multiplier (an exact penalty: Nocedal and Wright 2006, eq. 15.24).  Ends at once, with the failure `TOO_WIDE`, where a predicted
-    measurement has more than `widest` times the variance of its noise.
+    its multiplier (an exact penalty: Nocedal and Wright 2006, eq. 15.24).  Ends at once, with the failure `TOO_WIDE`, where
+    a predicted measurement has more than `widest` times the variance of its noise.
     """
     chain.x[:] = start
     cost, damping, failure = chain.linearize(), 0.0, f"not converged after {max_iterations} iterations"
@@ -61,7 +61,10 @@ def optimize(
 
 
 def _step(chain: Chain, solver: Solver, cost: float, damping: float, gated: bool) -> tuple[bool, float, float]:
-    """Take a step that does not raise the merit (not gated: that stays finite); accepted or not, the cost, the damping next time."""
+    """Take a step that does not raise the merit (not gated: that stays finite).
+
+    Returns whether there was one, the cost after it, and the damping of the next.
+    """
     x, broken = chain.x.copy(), chain.broken.copy()
     while True:
         price = np.abs(chain.multiplier)

@@ -11,6 +11,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.inputs import Inputs, prepare, scratch
+from piazzi.estimate.live import LiveFilter
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
 
@@ -58,6 +59,10 @@ class ExtendedKalmanFilter:
         mean, P, nu, S, seconds = filter_run(problem, inputs, self.update)
         return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs, seconds)
 
+    def start(self, problem: Problem) -> LiveFilter:
+        """A filter that takes one measurement at a time, beginning at the prior."""
+        return LiveFilter(problem, update_fragments(problem, self.update))
+
 
 def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tuple[Array, Array, Array, Array, float]:
     """Means (K, n), covariances (K, n, n), innovations (J, m), their covariances (J, m, m), and the seconds it took."""
@@ -67,9 +72,22 @@ def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tup
     nu, S = np.empty((J, m)), np.empty((J, m, m))
     started = time.perf_counter()
     library.run_filter(
-        K, inputs.t, inputs.t_prior, inputs.count, inputs.scale, *inputs.measured(problem), problem.given,
-        problem.process_noise.covariance, problem.mean, problem.covariance, *scratch(problem), mean, P, nu, S,
-    )  # fmt: skip
+        K,
+        inputs.t,
+        inputs.t_prior,
+        inputs.count,
+        inputs.scale,
+        *inputs.measured(problem),
+        problem.given,
+        problem.process_noise.covariance,
+        problem.mean,
+        problem.covariance,
+        *scratch(problem),
+        mean,
+        P,
+        nu,
+        S,
+    )
     return mean, P, nu, S, time.perf_counter() - started
 
 
@@ -132,16 +150,29 @@ def update(problem: Problem, belief: Any, station: str, z: Any, t: float = 0.0, 
     nu, S = np.empty((1, m)), np.empty((1, m, m))
     library = kernels.load(problem.spec("transition", *update_fragments(problem, method), "update"))
     library.update_once(
-        s, float(t), row, problem.station_sensor, problem.station_numbers, problem.station_noise, problem.station_correlated,
-        problem.given, *scratch(problem), x, P, nu, S,
-    )  # fmt: skip
+        s,
+        float(t),
+        row,
+        problem.station_sensor,
+        problem.station_numbers,
+        problem.station_noise,
+        problem.station_correlated,
+        problem.given,
+        *scratch(problem),
+        x,
+        P,
+        nu,
+        S,
+    )
     return Updated(x, P, nu[0, :width], S[0, :width, :width])
 
 
 def _belief(problem: Problem, belief: Any) -> tuple[Array, Array]:
     """Writable copies of a belief's mean and covariance."""
     names = problem.model.names
-    if belief is problem.prior or (isinstance(belief, Gaussian) and np.size(belief.mean) == len(problem.model.states) < len(names)):
+    if belief is problem.prior or (
+        isinstance(belief, Gaussian) and np.size(belief.mean) == len(problem.model.states) < len(names)
+    ):
         belief = Gaussian([*belief.mean, *problem.mean[len(problem.model.states) :]], problem.covariance)
     mean = finite_vector(belief.mean, len(names), "mean", names)
     return mean.copy(), covariance(belief.covariance, len(names), "covariance", names).copy()

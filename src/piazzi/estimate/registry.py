@@ -45,7 +45,11 @@ def _window(option: str) -> Mapping[str, Any]:
 
 ESTIMATORS: Mapping[str, Entry] = {
     "ekf": Entry(
-        "ekf[:joint|:components]", "extended Kalman filter", "piazzi.estimate.kalman:ExtendedKalmanFilter", ("realtime",), _update
+        "ekf[:joint|:components]",
+        "extended Kalman filter",
+        "piazzi.estimate.kalman:ExtendedKalmanFilter",
+        ("realtime",),
+        _update,
     ),
     "graph": Entry(
         "graph[:ekf|:prior|:window]",

@@ -10,6 +10,7 @@ from piazzi import kernels
 from piazzi.estimate.chain import chain_fragments
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.inputs import Inputs, prepare
+from piazzi.estimate.live_window import LiveWindow
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem, Tracking
@@ -66,22 +67,42 @@ class SlidingWindow:
         """
         inputs = prepare(problem, tracking)
         begin = self.first_states(inputs.t)
-        library = kernels.load(problem.spec(*chain_fragments(problem, "window"), lanes=machine_lanes()))
+        library = kernels.load(problem.spec(*chain_fragments(problem, "window_step", "window"), lanes=machine_lanes()))
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
         J = len(inputs.z)
         x, mean, P, P_delayed = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N)), np.empty((K, N, N))
         nu, S = np.empty((J, M)), np.empty((J, M, M))
         watch = Stopwatch()
         library.run_window(
-            K, begin, self.iterations, inputs.t, inputs.t_prior, inputs.count, inputs.scale, *inputs.measured(problem), problem.given,
-            problem.process_noise.covariance, problem.mean, problem.covariance, *window_space(problem, inputs, begin),
-            x, P_delayed, mean, P, nu, S,
-        )  # fmt: skip
+            K,
+            begin,
+            self.iterations,
+            inputs.t,
+            inputs.t_prior,
+            inputs.count,
+            inputs.scale,
+            *inputs.measured(problem),
+            problem.given,
+            problem.process_noise.covariance,
+            problem.mean,
+            problem.covariance,
+            *window_space(problem, inputs, begin),
+            x,
+            P_delayed,
+            mean,
+            P,
+            nu,
+            S,
+        )
         seconds = watch.seconds()
         details = {"lag": self.lag if self.lag_seconds is None else None, "lag_seconds": self.lag_seconds, "solver": "chain"}
         steps = K * self.iterations
         late = Estimate(problem, tracking, x, P_delayed, nu, S, steps, seconds, "delayed", None, details)
         return Estimate(problem, tracking, mean, P, nu, S, steps, seconds, "realtime", late, details)
+
+    def start(self, problem: Problem) -> LiveWindow:
+        """A window that takes one measurement at a time, beginning at the prior."""
+        return LiveWindow(problem, self.lag, self.lag_seconds, self.iterations)
 
 
 def window_space(problem: Problem, inputs: Inputs, begin: Array) -> tuple[Array, ...]:
@@ -93,7 +114,19 @@ def window_space(problem: Problem, inputs: Inputs, begin: Array) -> tuple[Array,
     in_epoch = int(np.diff(inputs.first_row).max()) * M
     Q_all = np.empty((W if problem.process_noise.is_integral else 1, N, N))
     return (
-        np.empty((W, N)), np.empty((W, N, N)), Q_all, np.empty(rows), np.empty((rows, N)), np.empty((W, N)), np.empty((W, N, N)),
-        np.empty((in_epoch + N, N + 1)), np.empty((W, N)), np.empty((W, N)), np.empty(M), np.empty((M, N)), np.empty(M * (M + N)),
-        np.empty((N, N)), np.empty((N, N)),
-    )  # fmt: skip
+        np.empty((W, N)),
+        np.empty((W, N, N)),
+        Q_all,
+        np.empty(rows),
+        np.empty((rows, N)),
+        np.empty((W, N)),
+        np.empty((W, N, N)),
+        np.empty((in_epoch + N, N + 1)),
+        np.empty((W, N)),
+        np.empty((W, N)),
+        np.empty(M),
+        np.empty((M, N)),
+        np.empty(M * (M + N)),
+        np.empty((N, N)),
+        np.empty((N, N)),
+    )

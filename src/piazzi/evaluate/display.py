@@ -14,7 +14,7 @@ from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, n
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
 
-    from piazzi.evaluate.compare import Comparison, Row
+    from piazzi.evaluate.comparison import Comparison, Row
 
 _VIEW = {"realtime": "real time", "delayed": "delayed"}
 _TEXT_COLUMNS = 2  # name and view, before the numbers
@@ -56,7 +56,12 @@ def columns(comparison: Comparison) -> list[Column]:
     ideal_nis = number(expected_nis(comparison), 3)
     found += [
         Column("mean NEES", "whole run", f"ideal {comparison.problem.model.n}", tuple(number(r.mean_nees, 3) for r in rows)),
-        Column("mean NEES", "last half", f"ideal {comparison.problem.model.n}", tuple(number(r.mean_nees_last_half, 3) for r in rows)),
+        Column(
+            "mean NEES",
+            "last half",
+            f"ideal {comparison.problem.model.n}",
+            tuple(number(r.mean_nees_last_half, 3) for r in rows),
+        ),
         Column("mean NIS", "", f"ideal {ideal_nis}", tuple(number(r.mean_nis, 3) for r in rows)),
         Column("iterations", "", "", tuple(str(r.iterations) if r.iterations else NOTHING for r in rows)),
         Column("time", "", "", tuple(duration(r.seconds) for r in rows)),
@@ -105,6 +110,7 @@ def render(comparison: Comparison, console: Console, options: ConsoleOptions) ->
             yield table
             if chosen is not everything:
                 yield Text("A wider terminal shows the whole run too.", style="dim")
+            yield Text("")
             break
     else:
         yield from blocks(everything)
@@ -121,7 +127,9 @@ def wide_table(shown: Sequence[Column]) -> Any:
     table = Table(box=box.SIMPLE_HEAD, header_style="bold", show_edge=False, padding=(0, 1, 0, 0))
     for i, c in enumerate(shown):
         heading = Text("\n".join([*c.name.split(), *filter(None, (c.part, c.unit))]))
-        table.add_column(heading, justify="left" if i < _TEXT_COLUMNS or not c.name else "right", no_wrap=True, vertical="bottom")
+        table.add_column(
+            heading, justify="left" if i < _TEXT_COLUMNS or not c.name else "right", no_wrap=True, vertical="bottom"
+        )
     for row in zip(*(c.texts for c in shown), strict=True):
         table.add_row(*(Text(v, style=_style(v)) for v in row))
     return table
@@ -129,17 +137,14 @@ def wide_table(shown: Sequence[Column]) -> Any:
 
 def blocks(shown: Sequence[Column]) -> Iterable[Any]:
     """For narrow terminals: every row as a title and lines of name and value."""
-    from rich.table import Table
     from rich.text import Text
 
     for row in zip(*(c.texts for c in shown), strict=True):
         remark = [row[-1]] if _style(row[-1]) else []
         yield Text(" ".join([row[0], f"({row[1]})", *remark]), style="bold")
-        table = Table.grid(padding=(0, 2))
         for c, value in list(zip(shown, row, strict=True))[_TEXT_COLUMNS:]:
             if c.name and value != NOTHING:
-                table.add_row(f"  {c.title}", Text(" ".join([value, _bracket(c.unit)]).strip()))
-        yield table
+                yield Text(f"  {c.title}: {value} {_bracket(c.unit)}".rstrip())
         yield Text("")
 
 

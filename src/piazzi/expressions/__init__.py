@@ -20,7 +20,18 @@ from piazzi.expressions.writing import write
 if TYPE_CHECKING:
     import sympy as sp
 
-__all__ = ["CONSTANTS", "FUNCTIONS", "ExpressionError", "check", "evaluate", "from_sympy", "is_name", "names", "symbol", "to_sympy"]
+__all__ = [
+    "CONSTANTS",
+    "FUNCTIONS",
+    "ExpressionError",
+    "check",
+    "evaluate",
+    "from_sympy",
+    "is_name",
+    "names",
+    "symbol",
+    "to_sympy",
+]
 
 
 def names(text: str) -> frozenset[str]:

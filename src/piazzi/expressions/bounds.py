@@ -16,13 +16,17 @@ from fractions import Fraction
 from typing import Any, TypeAlias
 
 from piazzi.expressions.errors import ExpressionError
-from piazzi.expressions.language import CONSTANTS, FUNCTIONS, MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum
+from piazzi.expressions.language import CONSTANTS, MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum
+from piazzi.expressions.numeric import CALLS
 from piazzi.expressions.parse import Parsed, parse
 
 MAX_EXPONENT = 64
 MAX_POWER_DIGITS = 4000
 LOG10_2 = math.log10(2.0)
+EXACT = frozenset({"abs", "min", "max"})
 FORWARD = frozenset({"sin", "cos", "tan", "sinh", "cosh", "tanh"})
+#: Digits before the decimal point, of functions with values of at most 1 or pi.
+SMALL = dict.fromkeys(("sin", "cos", "tanh", "sign"), 0.0) | dict.fromkeys(("asin", "acos", "atan", "atan2"), math.log10(math.pi))
 
 Value: TypeAlias = Fraction | float
 
@@ -66,7 +70,7 @@ def _bound(node: Node, text: str) -> Bound:
     except ZeroDivisionError:
         raise ExpressionError("division by zero", text, node.column) from None
     except OverflowError:
-        raise ExpressionError("this constant is too large for a double", text, node.column) from None
+        raise ExpressionError("this constant does not fit a double", text, node.column) from None
     except ValueError as error:
         if isinstance(error, ExpressionError):
             raise
@@ -107,7 +111,7 @@ def _check_value(value: Value | None, node: Node, text: str) -> None:
     elif isinstance(value, complex):
         problem = "this constant has no real value"
     elif value is not None and not math.isfinite(value):
-        problem = "this constant is too large for a double"
+        problem = "this constant does not fit a double"
     if problem:
         raise ExpressionError(problem, text, node.column)
 
@@ -159,19 +163,22 @@ def _product(factors: tuple[tuple[bool, Node], ...], text: str) -> Bound:
 
 def _power(base: Bound, exponent: Bound, node: Node, text: str) -> Bound:
     constant = exponent.value
-    degree = base.degree if constant is None else base.degree * abs(float(constant))
-    if constant is not None and max(degree, abs(constant)) > MAX_EXPONENT:
-        raise ExpressionError(f"exponent {degree:.6g} is beyond {MAX_EXPONENT}, the largest allowed", text, node.column)
-    size = abs(float(constant)) if isinstance(constant, Fraction) else max(abs(constant or 0.0), _ten_to(exponent.size))
+    magnitude = abs(float(constant or 0.0))
+    degree = base.degree if constant is None else base.degree * magnitude
+    if constant is not None and max(degree, magnitude) > MAX_EXPONENT:
+        problem = f"exponent {max(degree, magnitude):.6g} is beyond {MAX_EXPONENT}, the largest allowed"
+        raise ExpressionError(problem, text, node.exponent.column if isinstance(node, Power) else node.column)
+    size = magnitude if isinstance(constant, Fraction) else max(magnitude, _ten_to(exponent.size))
     if exponent.under_log:  # exp(a)**log(b) is b**a
         size *= _ten_to(base.digits)
     grown = _grown(size, max(base.digits, exponent.under_log), node, text)
     exponential = base.exponential or exponent.exponential
-    carried = base.digits + exponent.digits if exponential else 0.0
+    if exponential:
+        grown += base.digits + exponent.digits
     value = None
     if base.value is not None and constant is not None:
         value = _exact_or_double(operator.pow, base.value, constant)
-    return Bound(value, *3 * [grown + carried], base.under_log + exponent.under_log, exponential, degree)
+    return Bound(value, grown, grown, grown, base.under_log + exponent.under_log, exponential, degree)
 
 
 def _call(call: Call, arguments: list[Bound], text: str) -> Bound:
@@ -182,23 +189,28 @@ def _call(call: Call, arguments: list[Bound], text: str) -> Bound:
     value = None
     values = [a.value for a in arguments if a.value is not None]
     if len(values) == len(arguments):
-        value = EVALUATE[function](*values) if function in EXACT else EVALUATE[function](*map(float, values))
+        value = CALLS[function](*values) if function in EXACT else CALLS[function](*map(float, values))
     if function == "log":  # log(exp(a)) is a; of any other argument a logarithm leaves no number
-        return Bound(value, *3 * [digits if exponential else 0.0], under_log + digits, exponential)
+        unwrapped = digits if exponential else 0.0
+        return Bound(value, unwrapped, unwrapped, unwrapped, under_log + digits, exponential)
     if function == "exp":  # exp(a*log(b)) is b**a
+        if value == 0.0:
+            raise OverflowError  # downwards
         grown = _grown(_ten_to(arguments[0].size), under_log, call, text)
-        return Bound(value, *3 * [grown + digits], under_log, True)
+        grown += digits
+        return Bound(value, grown, grown, grown, under_log, True)
     if function in FORWARD or function == "hypot":  # cos(asin(a)) is sqrt(1 - a**2)
         digits = 2 * digits + LOG10_2
-    return Bound(value, *3 * [digits], under_log, exponential, degree)
+    return Bound(value, SMALL.get(function, digits), digits, digits, under_log, exponential, degree)
 
 
 def _grown(size: float, digits: float, node: Node, text: str) -> float:
     """Return the digits of a number of `digits` digits to the power `size`, if they are few enough to work out."""
-    grown = size * digits
+    grown = size * digits if digits else 0.0
     if grown > MAX_POWER_DIGITS:
         hint = "write its large numbers as decimals, such as 1000.0"
-        raise ExpressionError(f"integers in this power could grow to more than {MAX_POWER_DIGITS} digits; {hint}", text, node.column)
+        problem = f"integers in this power could grow to more than {MAX_POWER_DIGITS} digits; {hint}"
+        raise ExpressionError(problem, text, node.column)
     return grown
 
 
@@ -206,7 +218,10 @@ def _exact_or_double(operation: Callable[[Any, Any], Any], left: Value, right: V
     """Return the result exactly where both are exact and it is rational, else as a double (complex if it is not real)."""
     if isinstance(left, Fraction) and isinstance(right, Fraction):
         return operation(left, right)
-    return operation(float(left), float(right))
+    result = operation(float(left), float(right))
+    if result == 0.0 and left and right and operation is not operator.add and operation is not operator.sub:
+        raise OverflowError  # downwards
+    return result
 
 
 def _ten_to(digits: float) -> float:
@@ -215,12 +230,3 @@ def _ten_to(digits: float) -> float:
 
 def _log10_of_sum(a: float, b: float) -> float:
     return max(a, b) + math.log10(1.0 + 10.0 ** -abs(a - b))
-
-
-def _sign(value: Value) -> Value:
-    return Fraction((value > 0) - (value < 0))
-
-
-EXACT = frozenset({"abs", "min", "max", "sign"})
-EVALUATE: dict[str, Callable[..., Any]] = {"abs": abs, "min": min, "max": max, "sign": _sign}
-EVALUATE |= {name: getattr(math, name) for name in FUNCTIONS if name not in EXACT}

@@ -10,8 +10,8 @@ from typing import TypeAlias
 
 #: Allowed functions and how many arguments each takes; `min` and `max` take that many or more.
 FUNCTIONS: Mapping[str, int] = MappingProxyType(
-    dict.fromkeys("sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs sign".split(), 1)
-    | dict.fromkeys("atan2 hypot min max".split(), 2)
+    dict.fromkeys(("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "sign"), 1)
+    | dict.fromkeys(("atan2", "hypot", "min", "max"), 2)
 )
 CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": math.pi})
 VARIADIC = frozenset({"min", "max"})
@@ -23,8 +23,8 @@ MAX_DEPTH = 50
 MAX_DIGITS = 308
 #: What a double can need: with SymPy's usual 15, its printers drop the last two.
 FLOAT_DIGITS = 17
-#: SymPy compares the arguments of min and max pair by pair: 40 take seconds.
-MAX_EXTREMES = 40
+#: SymPy compares the arguments of min and max pair by pair: 20 take seconds.
+MAX_EXTREMES = 20
 
 
 @dataclass(frozen=True, slots=True)

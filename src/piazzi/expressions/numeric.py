@@ -11,7 +11,9 @@ from piazzi.expressions.parse import parse
 
 CALLS: Mapping[str, Callable[..., float]] = MappingProxyType(
     {
-        **{name: getattr(math, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")},
+        **{
+            name: getattr(math, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")
+        },
         **{name: getattr(math, name) for name in ("exp", "log", "sqrt", "hypot")},
         "abs": abs,
         "sign": lambda x: float(x > 0) - float(x < 0),
@@ -53,6 +55,6 @@ def _value(node: Node, values: Mapping[str, float]) -> float:
                 total = total / _value(factor, values) if divides else total * _value(factor, values)
             return total
         case Power(base=base, exponent=exponent):
-            return _value(base, values) ** _value(exponent, values)
+            return float(_value(base, values) ** _value(exponent, values))  # TypeError if complex
         case Call(function=function, arguments=arguments):
             return float(CALLS[function](*(_value(a, values) for a in arguments)))

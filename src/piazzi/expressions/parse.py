@@ -14,10 +14,7 @@ RecursionError for sums of about 2900 terms).
 
 from __future__ import annotations
 
-import keyword
 import math
-import re
-import unicodedata
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
@@ -30,7 +27,6 @@ from piazzi.expressions.language import (
     MAX_DIGITS,
     MAX_EXTREMES,
     MAX_LENGTH,
-    MAX_NAME,
     VARIADIC,
     Call,
     Name,
@@ -41,24 +37,9 @@ from piazzi.expressions.language import (
     Product,
     Sum,
 )
+from piazzi.expressions.tokens import Token, tokenize
 
-HINTS = {
-    "^": "write ** for powers",
-    "=": "an equation is written as its right-hand side alone",
-    ".": "attributes are not allowed",
-    "[": "subscripts are not allowed",
-    "]": "subscripts are not allowed",
-    "'": "strings are not allowed",
-    '"': "strings are not allowed",
-    "<": "comparisons are not allowed",
-    ">": "comparisons are not allowed",
-}
 ALIASES = {"ln": "log", "sgn": "sign", "fabs": "abs", "pow": "**"}
-
-TOKEN = re.compile(
-    r"(?P<space>[ \t\r\n]+)|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
-    r"|(?P<name>[^\W\d]\w*)|(?P<operator>\*\*|[-+*/(),])"
-)
 
 
 class Parsed(NamedTuple):
@@ -69,20 +50,14 @@ class Parsed(NamedTuple):
     names: Mapping[str, int]
 
 
-class Token(NamedTuple):
-    """A piece of the text: its kind ("number", "name", "operator" or "end"), the piece, its column from 1."""
-
-    kind: str
-    piece: str
-    column: int
-
-
 def parse(text: str) -> Parsed:
     """Return the tree of an equation; `ExpressionError` says what is outside the language, and where."""
     if not isinstance(text, str):
         raise ExpressionError(f"an equation must be text, not {type(text).__name__}", "")
     if len(text) > MAX_LENGTH:
-        raise ExpressionError(f"the equation has {len(text)} characters; at most {MAX_LENGTH} are allowed", text, MAX_LENGTH + 1)
+        raise ExpressionError(
+            f"the equation has {len(text)} characters; at most {MAX_LENGTH} are allowed", text, MAX_LENGTH + 1
+        )
     reader = _Reader(text)
     try:
         tree = reader.sum()
@@ -102,50 +77,12 @@ def is_name(text: str) -> bool:
     return isinstance(tree, Name) and tree.name == text and text not in CONSTANTS
 
 
-def _tokenize(text: str) -> list[Token]:
-    tokens, position = [], 0
-    while position < len(text):
-        match = TOKEN.match(text, position)
-        if match is None:
-            raise _bad_character(text, position)
-        token = Token(match.lastgroup or "", match.group(), position + 1)
-        if token.kind == "name":
-            _check_name(text, token)
-        if token.kind != "space":
-            tokens.append(token)
-        position = match.end()
-    return [*tokens, Token("end", "", len(text) + 1)]
-
-
-def _bad_character(text: str, position: int) -> ExpressionError:
-    character = text[position]
-    reason = HINTS.get(character, f"U+{ord(character):04X} is not part of the equation language")
-    return ExpressionError(f"{quote(character)}: {reason}", text, position + 1)
-
-
-def _check_name(text: str, token: Token) -> None:
-    name, problem = token.piece, ""
-    written_as = unicodedata.normalize("NFKC", name)
-    if len(name) > MAX_NAME:
-        problem = f"name {quote(name)} has {len(name)} characters; at most {MAX_NAME} are allowed"
-    elif name.startswith("_") or "__" in name:
-        problem = f"name {quote(name)}: a leading or double underscore is not allowed"
-    elif written_as != name:  # Python would read two different spellings as one name
-        problem = f"name {quote(name)} is a look-alike of {quote(written_as)}; write that"
-    elif not all(c == "_" or c.isalpha() or (c.isascii() and c.isdigit()) for c in name):
-        problem = f"name {quote(name)} may hold letters, digits 0-9 and underscores only"
-    elif keyword.iskeyword(name):
-        problem = f"{quote(name)} is a reserved word of Python"
-    if problem:
-        raise ExpressionError(problem, text, token.column)
-
-
 class _Reader:
     """One pass over the tokens by recursive descent; recursion is bounded by `MAX_DEPTH`, chains are loops."""
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.tokens = iter(_tokenize(text))
+        self.tokens = iter(tokenize(text))
         self.next = next(self.tokens)
         self.names: dict[str, int] = {}
         self.depth = 0

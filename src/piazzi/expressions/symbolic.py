@@ -42,7 +42,7 @@ def build(parsed: Parsed, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
 def _build(node: Node, text: str, symbols: Mapping[str, sp.Symbol]) -> Any:
     try:
         expr = _build_unchecked(node, text, symbols)
-        finite = not expr.is_number or _is_finite_real(expr)
+        finite = _is_finite_real(expr, grows=isinstance(node, Power | Call))
     except ExpressionError:
         raise
     except Exception as error:  # SymPy raises anything from TypeError to AttributeError for values it cannot compare or place
@@ -108,7 +108,7 @@ def _product(factors: list[tuple[bool, Any, int]], text: str) -> Any:
 
 def _power(base: Any, exponent: Any, node: Node, text: str) -> Any:
     """Return the power; the bounds hold again for what SymPy has simplified, which they should never have to catch."""
-    if exponent.is_Number and abs(exponent) > MAX_EXPONENT:
+    if exponent.is_number and abs(float(exponent)) > MAX_EXPONENT:
         raise ExpressionError(f"exponent simplifies to {float(exponent):.6g}, beyond {MAX_EXPONENT}", text, node.column)
     return base**exponent
 
@@ -125,14 +125,18 @@ def _exp(argument: Any) -> Any:
     return sp.exp(argument)
 
 
-def _is_finite_real(constant: Any) -> bool:
+def _is_finite_real(expr: Any, *, grows: bool) -> bool:
+    """Return False for a constant, left by cancellation, that is no double: SymPy hangs when it compares exp(exp(exp(100)))."""
+    if not (expr.is_Number or expr.is_NumberSymbol or (grows and expr.is_number)):
+        return True
     try:
-        return math.isfinite(constant)
+        return _fits_a_double(expr)
     except TypeError:  # complex, or complex infinity
         return False
 
 
-def _fits_a_double(number: Any) -> bool:
-    if number.is_Rational:
-        return max(abs(number.p), number.q) < 10**MAX_DIGITS
-    return math.isfinite(number)
+def _fits_a_double(constant: Any) -> bool:
+    if constant.is_Rational:
+        return bool(max(abs(constant.p), constant.q) < 10**MAX_DIGITS)
+    double = float(constant)
+    return math.isfinite(double) and (double != 0.0 or not constant)

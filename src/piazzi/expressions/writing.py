@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import numbers
+from collections.abc import Iterable
 from typing import Any
 
 from piazzi.expressions.bounds import read
 from piazzi.expressions.errors import ExpressionError, quote
-from piazzi.expressions.language import FLOAT_DIGITS, FUNCTIONS, MAX_DIGITS
+from piazzi.expressions.language import FLOAT_DIGITS, FUNCTIONS, MAX_DIGITS, MAX_LENGTH
 from piazzi.expressions.parse import is_name
 
 SUPPORTED = f"an equation has real numbers, symbols, pi, + - * / ** and {', '.join(FUNCTIONS)}"
@@ -30,6 +31,8 @@ def write(expr: object) -> str:
     try:
         _check_symbols(expr)
         text, _ = _write(expr)
+        if len(text) > MAX_LENGTH:
+            text = text.replace(" ", "")
         read(text)
     except _UnsupportedError as error:
         whole, part = str(expr), str(error.part)
@@ -41,9 +44,10 @@ def write(expr: object) -> str:
 
 def _check_symbols(expr: object) -> None:
     seen: dict[str, object] = {}
-    for symbol in getattr(expr, "free_symbols", ()):
-        if not is_name(str(symbol)):
-            raise _UnsupportedError(symbol, "a symbol's name must be one that an equation can hold")
+    symbols: Iterable[Any] = getattr(expr, "free_symbols", ())
+    for symbol in symbols:
+        if not (is_name(str(symbol)) and symbol.is_commutative):
+            raise _UnsupportedError(symbol, "a symbol must be commutative, with a name that an equation can hold")
         if seen.setdefault(str(symbol), symbol) != symbol:
             raise _UnsupportedError(symbol, "two different symbols have this name (their assumptions differ)")
 
@@ -54,7 +58,7 @@ def _write(expr: Any) -> tuple[str, int]:
         return _signed(*_number(expr), PRODUCT if "/" in _number(expr)[1] else ATOM)
     import sympy as sp
 
-    if not isinstance(expr, sp.Expr) or expr.is_commutative is False:
+    if not isinstance(expr, sp.Expr):
         raise _UnsupportedError(expr, f"{type(expr).__name__} is not supported; {SUPPORTED}")
     if type(expr) is sp.Symbol:
         return expr.name, ATOM
@@ -89,7 +93,7 @@ def _number(value: Any) -> tuple[bool, str]:
             raise _UnsupportedError("number", f"an integer has more than {MAX_DIGITS} digits")
         return bool(value < 0), str(top) if bottom == 1 else f"{top}/{bottom}"
     double = float(value)
-    if not math.isfinite(double) or (double == 0.0) != (value == 0):
+    if not math.isfinite(double) or (double == 0.0) != (not value):
         raise _UnsupportedError(value, "this number does not fit a double")
     return double < 0, repr(abs(double))
 

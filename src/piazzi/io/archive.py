@@ -53,7 +53,7 @@ def _arrays(archive: zipfile.ZipFile, keys: Sequence[str], required: Collection[
     wanted = {key: members[key] for key in keys if key in members}
     total = sum(info.file_size for info in wanted.values())
     if total > limit:
-        raise ValueError(f"its arrays would take {total:,} bytes, which is absurd for an archive of this size (limit {limit:,})")
+        raise ValueError(f"its arrays would take {total:,} bytes, absurd for an archive of this size (limit {limit:,})")
     return {key: _array(archive, info, key) for key, info in wanted.items()}
 
 
@@ -67,8 +67,9 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, key: str) -> Array:
             raise ValueError(f"key {key!r} holds Python objects (pickled), which are never loaded")
         if dtype.kind not in "biuf":
             raise ValueError(f"key {key!r} is not made of real numbers: it has type {str(dtype)[:60]}")
-        if prod(shape) * dtype.itemsize != info.file_size - stream.tell():
-            raise ValueError(f"key {key!r} declares shape {str(shape)[:60]} but holds {info.file_size - stream.tell():,} bytes of data")
+        held = info.file_size - stream.tell()
+        if prod(shape) * dtype.itemsize != held:
+            raise ValueError(f"key {key!r} declares shape {str(shape)[:60]} but holds {held:,} bytes of data")
     with archive.open(info) as stream:
         out: Array = np.lib.format.read_array(stream, allow_pickle=False)
     return out

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
 
 import numpy as np
 
 from piazzi.problem.checks import Array
+from piazzi.scenarios.faults import shown
 
 STATION = "station"
 MAX_BYTES = 2**32
 MAX_COLUMNS = 1000
-_WIDEST = 64  # bytes of a station's name that the fast way can hold
+_ODD = (b'"', b"\r", b"\0", b"rue", b"RUE", b"alse", b"ALSE")  # true and false are numbers to pandas, but not to us
+_SMALL = 2**19  # bytes for which the careful way takes less time than importing pandas
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +41,7 @@ class Cells:
 
 
 def read_cells(path: str | os.PathLike[str]) -> Cells:
-    """All columns of a file whose first line names them.
+    """All columns of a file whose first line, after comments, names them.
 
     Raises
     ------
@@ -47,65 +50,142 @@ def read_cells(path: str | os.PathLike[str]) -> Cells:
     ValueError
         Where it is no table of numbers: with the line, the column and the cell.
     """
-    lines = _lines(path)
-    top = 0
-    while top < len(lines) and (lines[top].startswith("#") or not lines[top].strip()):
-        top += 1
-    if top == len(lines):
-        raise ValueError("the file is empty: it has no line that names its columns")
-    comments = tuple(line[1:].strip() for line in lines[:top] if line.startswith("#"))
-    try:
-        header = _header(next(csv.reader([lines[top]])), top + 1)
-        return _fast(lines, top, header, comments) or _careful(lines, top, header, comments)
-    except csv.Error as error:
-        raise ValueError(f"line {top + 1}: {error}") from None
-
-
-def _lines(path: str | os.PathLike[str]) -> list[str]:
     with open(path, "rb") as file:
         content = file.read(2**16)
         if b"\0" in content:
             raise ValueError("it is not text: it has zero bytes")
         content += file.read(MAX_BYTES - len(content))
+    rest = content.removeprefix(b"\xef\xbb\xbf")
+    rest = rest.replace(b"\r\n", b"\n") if b"\r" in rest else rest
+    comments: list[str] = []
+    line = 0
+    while rest:
+        line += 1
+        first, _, rest = rest.partition(b"\n")
+        if first.startswith(b"#"):
+            comments.append(_decoded(first[1:], line).strip())
+        elif first.strip():
+            header = _header(_decoded(first, line), line)
+            rest = rest.rstrip(b"\n")
+            return _fast(rest, line + 1, header, tuple(comments)) or _careful(rest, line + 1, header, tuple(comments))
+    raise ValueError("the file is empty: no line names its columns")
+
+
+def _decoded(content: bytes, line: int) -> str:
+    """The text of bytes that begin at a line."""
     try:
-        text = content.decode("utf-8-sig")
+        return content.decode("utf-8")
     except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
+        line += content.count(b"\n", 0, error.start)
         raise ValueError(f"line {line}: it is not UTF-8 text: byte 0x{content[error.start]:02x}") from None
-    lines = (text.replace("\r\n", "\n") if "\r" in text else text).split("\n")
-    while lines and not lines[-1]:
-        lines.pop()
-    return lines
 
 
-def _header(cells: list[str], line: int) -> list[str]:
-    header = [cell.strip() for cell in cells]
+def _header(first: str, line: int) -> list[str]:
+    try:
+        header = [cell.strip() for cell in next(csv.reader([first]))]
+    except csv.Error as error:
+        raise ValueError(f"line {line}: {error}") from None
     if len(header) > MAX_COLUMNS:
-        raise ValueError(f"line {line}: it names {len(header)} columns; at most {MAX_COLUMNS} are allowed")
+        raise ValueError(f"line {line}: there are {len(header)} columns; at most {MAX_COLUMNS} are allowed")
     for i, name in enumerate(header):
         if not name:
             raise ValueError(f"line {line}: column {i + 1} has no name")
         if name in header[:i]:
-            raise ValueError(f"line {line}: two columns are called {name[:40]!r}")
+            raise ValueError(f"line {line}: two columns are called {shown(name)}")
     return header
 
 
-def _fast(lines: list[str], top: int, header: list[str], comments: tuple[str, ...]) -> Cells | None:
-    """The table where every line is one regular row, else None."""
-    body = lines[top + 1 :]
-    if not body or any('"' in line or not line for line in body):
+def _fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -> Cells | None:
+    """The table where every line is one regular row of plain cells, else None."""
+    if len(body) < _SMALL or any(odd in body for odd in _ODD) or not _is_regular(body, len(header)):
         return None
-    kinds = [(f"c{i}", f"S{_WIDEST}" if name == STATION else "f8") for i, name in enumerate(header)]
+    import pandas as pd  # type: ignore[import-untyped,unused-ignore]
+
+    kinds = {i: "category" if name == STATION else float for i, name in enumerate(header)}
     try:
-        table = np.loadtxt(_with_nan(body), dtype=kinds, delimiter=",", comments=None, ndmin=1)
-    except (ValueError, UnicodeEncodeError):
+        table = pd.read_csv(
+            io.BytesIO(body), header=None, index_col=False, dtype=kinds, na_values=[""], keep_default_na=False,
+            skip_blank_lines=False, engine="c", low_memory=False,
+        )  # fmt: skip
+    except (ValueError, OverflowError):  # among them all of pandas' own errors of parsing
         return None
-    if len(table) != len(body):
-        return None
-    numbers = {name: np.ascontiguousarray(table[f"c{i}"]) for i, name in enumerate(header) if name != STATION}
-    station, names = None, ()
+    numbers = {name: np.ascontiguousarray(table[i], dtype=float) for i, name in enumerate(header) if name != STATION}
+    station: Array | None = None
+    names: tuple[str, ...] = ()
     if STATION in header:
-        station, names = _indexed(table[f"c{header.index(STATION)}"])
-        if any(len(name) >= _WIDEST for name in names):
+        column = table[header.index(STATION)].cat
+        station, names = _merged(np.asarray(column.codes, dtype=np.int64), [str(name).strip() for name in column.categories])
+        if "" in names or (station < 0).any():
             return None
-    return Cells(comments, numbers, station, names, range(top + 2, len(lines) + 1))
+    return Cells(comments, numbers, station, names, range(line, line + len(table)))
+
+
+def _is_regular(body: bytes, columns: int) -> bool:
+    """Whether every line has as many cells as there are columns, and none is empty."""
+    raw = np.frombuffer(body, dtype=np.uint8)
+    ends = np.append(np.flatnonzero(raw == ord("\n")), len(raw))
+    starts = np.append(0, ends[:-1] + 1)
+    commas = np.flatnonzero(raw == ord(","))
+    if not len(raw) or (ends == starts).any() or len(commas) != (columns - 1) * len(ends):
+        return False
+    table = commas.reshape(len(ends), columns - 1)
+    return bool((table >= starts[:, None]).all() and (table <= ends[:, None]).all())
+
+
+def _merged(index: Array, given: list[str]) -> tuple[Array, tuple[str, ...]]:
+    """Indices into different names where several may be the same; -1 stays."""
+    names = {name: i for i, name in enumerate(dict.fromkeys(given))}
+    return np.array([*(names[name] for name in given), -1], dtype=np.int64)[index], tuple(names)
+
+
+def _careful(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -> Cells:
+    """The table row by row; raises ValueError at the first cell that does not fit."""
+    text = _decoded(body, line)
+    columns: dict[str, list[float]] = {name: [] for name in header if name != STATION}
+    stations: dict[str, int] = {}
+    station: list[int] = []
+    lines: list[int] = []
+    reader = csv.reader(_split(text), strict=True)
+    try:
+        for row in reader:
+            if not row:
+                continue
+            at = line + reader.line_num - 1
+            if len(row) != len(header):
+                cells = f"{len(row)} cell{'s' * (len(row) != 1)}"
+                raise ValueError(f"line {at} has {cells}; the header names {len(header)} ({', '.join(header)[:200]})")
+            for name, cell in zip(header, row, strict=True):
+                if name == STATION:
+                    station.append(stations.setdefault(_name(cell, at), len(stations)))
+                else:
+                    columns[name].append(_number(cell, name, at))
+            lines.append(at)
+    except csv.Error as error:
+        raise ValueError(f"line {line + reader.line_num - 1}: {error}") from None
+    numbers = {name: np.array(column, dtype=float) for name, column in columns.items()}
+    index = np.array(station, dtype=np.int64) if STATION in header else None
+    return Cells(comments, numbers, index, tuple(stations), lines)
+
+
+def _split(text: str) -> list[str]:
+    """Lines with their ends, and no other kind of line end than the usual one."""
+    return [part + "\n" for part in text.split("\n")]
+
+
+def _name(cell: str, line: int) -> str:
+    if not cell.strip():
+        raise ValueError(f"line {line}: the station has no name")
+    return cell.strip()
+
+
+def _number(cell: str, name: str, line: int) -> float:
+    """The number in a cell, NaN in an empty one."""
+    text = cell.strip()
+    if not text:
+        return nan
+    try:
+        if not text.isascii() or "_" in text:
+            raise ValueError
+        return float(text)
+    except ValueError:
+        raise ValueError(f"line {line}: {name} is {shown(cell)}; it must be a number, or empty where it is missing") from None

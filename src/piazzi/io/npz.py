@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from math import ceil
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from piazzi.io.archive import read_arrays
+from piazzi.io.atomic import atomic_path
 from piazzi.kernels import Taylor
-from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Tracking
+from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Tracking, Truth
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
 from piazzi.scenarios import load_scenario
 
 BASE = "satellite-bearing"
 REQUIRED = ("R", "Q", "dt", "meas", "x0", "P0")
-MAX_SUBSTEPS = 10**9
+MAX_SUBSTEPS = 10**10
 
 
 def read_npz(path: str | os.PathLike[str]) -> tuple[Problem, Tracking]:
@@ -66,7 +67,7 @@ def _dt(arrays: dict[str, Array]) -> float:
         raise ValueError(f"key 'dt' is {_shown(value)}; it must be one positive number of seconds")
     dt, epochs = float(value.reshape(-1)[0]), max(int(np.size(arrays["meas"])), 1)
     if dt * epochs > MAX_SUBSTEPS:
-        raise ValueError(f"key 'dt' is {dt:g} s over {epochs} measurements: one-second substeps are too many (limit {MAX_SUBSTEPS:g})")
+        raise ValueError(f"key 'dt' is {dt:g} s over {epochs} epochs: too many one-second substeps (limit {MAX_SUBSTEPS:g})")
     return dt
 
 
@@ -77,7 +78,7 @@ def _tracking(arrays: dict[str, Array]) -> Tracking:
     meas = meas.reshape(-1)
     truth = arrays.get("truth")
     if truth is not None and truth.shape != (len(meas), 4):
-        raise ValueError(f"key 'truth' has shape {truth.shape}; it must be ({len(meas)}, 4), as there are {len(meas)} measurements")
+        raise ValueError(f"key 'truth' has shape {truth.shape}; with {len(meas)} measurements it must be ({len(meas)}, 4)")
     if np.isinf(meas).any():
         k = int(np.argmax(np.isinf(meas)))
         raise ValueError(f"key 'meas' is {meas[k]} at {k}; write NaN for a missing one")
@@ -92,5 +93,59 @@ def _shown(value: Any) -> str:
 
 
 def write_npz(path: str | os.PathLike[str], problem: Problem, tracking: Tracking) -> None:
-    """Write a problem and its tracking in the founding layout."""
-    raise NotImplementedError(Path(path))
+    """Write a problem and its measurements in the founding layout, such that `read_npz` gives them back bit for bit.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be written.
+    ValueError
+        For anything that the layout cannot hold: it says what, and that ``.nc`` holds everything.
+    """
+    reason = _misfit(problem, tracking)
+    if reason:
+        raise ValueError(f"{os.fspath(path)}: the .npz layout cannot hold this: {reason}; .nc can")
+    arrays = {
+        "R": problem.stations[0].noise[0, 0], "Q": problem.process_noise.covariance, "dt": _step(tracking.times),
+        "meas": tracking.values[:, 0], "x0": problem.prior.mean, "P0": problem.prior.covariance,
+    }  # fmt: skip
+    write_arrays(path, arrays if tracking.truth is None else {**arrays, "truth": tracking.truth})
+
+
+def write_arrays(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
+    """Write arrays by key, whole or not at all."""
+    with atomic_path(path) as work, open(work, "wb") as file:
+        np.savez(file, allow_pickle=False, **{key: np.asarray(value) for key, value in arrays.items()})
+
+
+def _step(times: Array) -> float | None:
+    """The number dt for which the epochs are k dt exactly, None where there is none."""
+    K = len(times)
+    guess = float(times[-1]) / max(K - 1, 1) if K > 1 else 1.0
+    for dt in (guess, np.nextafter(guess, 0.0), np.nextafter(guess, np.inf), float(times[1]) if K > 1 else 1.0):
+        if dt > 0 and np.array_equal(np.arange(K) * dt, times):
+            return float(dt)
+    return None
+
+
+def _misfit(problem: Problem, tracking: Tracking) -> str:
+    """What the founding layout has no place for, "" where it has one for everything."""
+    base = load_scenario(BASE).problem
+    noise, dt = problem.process_noise, _step(tracking.times)
+    faults = {
+        f"its model is not that of {BASE}": problem.model != base.model or problem.parameters != base.parameters,
+        "it has other than one station": len(problem.stations) != 1,
+        "its process noise is not Q dt per step": (noise.per, noise.method) != ("second", "scaled"),
+        "its prior is not at the first epoch": problem.prior_time not in (None, 0.0),
+        "its epochs are not k dt": dt is None,
+        "it has more than one measurement at an epoch": len(tracking.row_times) != len(tracking.times),
+        f"its integrator is not {Taylor(ceil(dt or 1.0))}": problem.integrator != Taylor(ceil(dt or 1.0)),
+        "its truth differs from its model": problem.truth is not None and not _is_plain(problem.truth),
+    }
+    return next((fault for fault, here in faults.items() if here), "")
+
+
+def _is_plain(truth: Truth) -> bool:
+    """Whether a truth half says nothing."""
+    nothing = (truth.state, truth.process_noise, truth.integrator)
+    return all(part is None for part in nothing) and not truth.parameters and truth.measurement_noise

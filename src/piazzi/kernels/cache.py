@@ -1,4 +1,4 @@
-"""Where compiled kernels live between runs: a private folder, one sub-folder per specification, each with a checksum manifest."""
+"""Compiled kernels between runs: one sub-folder of the private folder per specification, each with a checksum manifest."""
 
 from __future__ import annotations
 
@@ -7,16 +7,14 @@ import json
 import logging
 import os
 import shutil
-import stat
 import tempfile
 import time
-import warnings
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 from piazzi.kernels.build import compile_entries, entry_names, plain_entries
+from piazzi.kernels.folder import private_folder, writable_folder
 from piazzi.kernels.library import load_objects
 from piazzi.kernels.spec import KernelSpec
 
@@ -54,11 +52,13 @@ def _plain(spec: KernelSpec) -> SimpleNamespace:
 
 
 def _from_disk_or_built(spec: KernelSpec) -> SimpleNamespace:
-    digest = spec.digest()
-    home = folder() / digest
-    entries = _read(home)
+    digest, (place, _) = spec.digest(), private_folder()
+    entries = _read(place / digest) if place else None
     if entries is None:
-        LOGGER.info("compiling %s for %s, once (about 5 to 15 s) ...", " + ".join(spec.fragments[-1:]), ", ".join(spec.model.names))
+        home = writable_folder() / digest
+        LOGGER.info(
+            "compiling %s for %s, once (about 5 to 15 s) ...", " + ".join(spec.fragments[-1:]), ", ".join(spec.model.names)
+        )
         started = time.perf_counter()
         entries = _build(spec, home)
         LOGGER.debug("compiled in %.1f s into %s", time.perf_counter() - started, home)
@@ -77,7 +77,7 @@ def _read(home: Path) -> dict[str, Any] | None:
         symbols = {name: (symbol, tuple(kinds)) for name, (symbol, kinds) in manifest["symbols"].items()}
         if manifest["seal"] != _seal(manifest):
             return None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
     return dict(load_objects(objects, symbols))
 
@@ -97,7 +97,10 @@ def _build(spec: KernelSpec, home: Path) -> dict[str, Any]:
         objects, symbols = compile_entries(work / "kernels.py", entry_names(source))
         for name, code in objects.items():
             (work / f"{name}.o").write_bytes(code)
-        manifest: dict[str, Any] = {"objects": {n: hashlib.sha256(c).hexdigest() for n, c in objects.items()}, "symbols": symbols}
+        manifest: dict[str, Any] = {
+            "objects": {n: hashlib.sha256(c).hexdigest() for n, c in objects.items()},
+            "symbols": symbols,
+        }
         (work / MANIFEST).write_text(json.dumps(manifest | {"seal": _seal(json.loads(json.dumps(manifest)))}))
         _move(work, home)
     finally:
@@ -120,33 +123,3 @@ def _move(work: Path, home: Path) -> None:
             except OSError:
                 pass
             shutil.rmtree(aside, ignore_errors=True)
-
-
-@cache
-def folder() -> Path:
-    """The private cache folder: PIAZZI_CACHE, else XDG_CACHE_HOME/piazzi, else ~/.cache/piazzi; else a temporary one, with one warning."""
-    named = os.environ.get("PIAZZI_CACHE")
-    try:
-        place = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "piazzi"
-        place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        _check_private(place)
-        with tempfile.TemporaryFile(dir=place):
-            return place
-    except (OSError, RuntimeError) as error:
-        temporary = Path(tempfile.mkdtemp(prefix="piazzi-cache-"))
-        import atexit
-
-        atexit.register(shutil.rmtree, temporary, True)
-        warnings.warn(f"no private, writable folder for compiled kernels ({error}); compiling into a temporary one. Set PIAZZI_CACHE.", stacklevel=2)
-        return temporary
-
-
-def _check_private(place: Path) -> None:
-    """Raise unless the folder is ours alone: what is in it is executed."""
-    if not hasattr(os, "getuid"):
-        return
-    state = place.stat()
-    if state.st_uid != os.getuid():
-        raise OSError(f"{place} belongs to another user")
-    if stat.S_IMODE(state.st_mode) & 0o077:
-        os.chmod(place, 0o700)

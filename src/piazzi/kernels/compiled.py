@@ -24,6 +24,7 @@ from piazzi.kernels.lanes import (
     unit,
     vector,
 )
+from piazzi.kernels.plain import unless_missing as _unless_missing
 from piazzi.kernels.plain import wrap_angle as _wrap_angle
 
 # "contract" lets a*b + c round once; nothing else of fast-math, so that NaN keeps meaning "missing"
@@ -44,4 +45,4 @@ def entry(function: Callable[..., Any]) -> Any:
     return cfunc(types.void(*(_SCALARS.get(k, k) for k in kinds)), **OPTIONS)(function)
 
 
-wrap_angle = inline(_wrap_angle)
+wrap_angle, unless_missing = inline(_wrap_angle), inline(_unless_missing)

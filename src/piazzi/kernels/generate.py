@@ -1,11 +1,12 @@
-"""A model's equations -> the source of its functions, specialised for its sizes.  Needs SymPy; runs only when nothing is cached.
+"""A model's equations -> the source of its functions, specialised for its sizes.  Needs SymPy; runs when nothing is cached.
 
-The functions written here (sizes: `ND` states, `N` values with the estimated constants, `M` components of the widest sensor):
+Sizes: `ND` states, `N` values with the estimated constants, `M` components of the widest sensor.  The functions:
 
 * ``dynamics(t, x, p)``, ``rhs(t, x, R, p)``: dx/dt, and with it dR/dt = F R for the first `ND` rows of a transition matrix
-* ``substep(t, h, x, p)``, ``substep_jacobian(t, h, x, R, p)``: one step of the integrator, and the product of its derivative with R
+* ``substep(t, h, x, p)``, ``substep_jacobian(t, h, x, R, p)``: one step of the integrator; with its derivative times R
 * ``first_rows()``, ``complete(R)``: the rows of the identity to start from; R with the constants' rows below it
-* ``measure_into(sensor, t, x, p, s, at, out, row)``, ``innovate(sensor, t, x, p, s, at, z, row, nu, H, out)``: h; z - h wrapped, and H
+* ``measure_into(sensor, t, x, p, s, at, out, row)``: h
+* ``innovate(sensor, t, x, p, s, at, z, row, nu, H, out)``: z - h, angles wrapped, and H
 """
 
 from __future__ import annotations
@@ -23,7 +24,13 @@ if TYPE_CHECKING:
 
 def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
     """Source of the sizes, dynamics, step and sensors; `lanes` problems are worked on at once where there are that many."""
-    sizes = {"LANES": lanes, "ND": len(model.states), "N": model.n, "M": model.width, "NUMBERS": max([len(model.numbers(s)) for s in model.sensors] + [1])}
+    sizes = {
+        "LANES": lanes,
+        "ND": len(model.states),
+        "N": model.n,
+        "M": model.width,
+        "NUMBERS": max([len(model.numbers(s)) for s in model.sensors] + [1]),
+    }
     parts = ["".join(f"{k} = {v}\n" for k, v in sizes.items()), "\n\n", _identity_source(model)]
     if not model.discrete:
         parts.append(_dynamics_source(model))
@@ -132,7 +139,11 @@ def _map_source(model: Model, nxt: Sequence[sp.Expr], h: sp.Symbol) -> str:
         function("scalar_step", arguments, names, list(nxt))
         + function("scalar_step_G", arguments, names, list(nxt) + G.outputs)
         + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
-        + _inline("substep_jacobian(t, h, x, R, p)", _unpack(results + G.names, f"scalar_step_G({call})"), f"return {whole}, matrix({rows})")
+        + _inline(
+            "substep_jacobian(t, h, x, R, p)",
+            _unpack(results + G.names, f"scalar_step_G({call})"),
+            f"return {whole}, matrix({rows})",
+        )
     )
 
 
@@ -163,16 +174,24 @@ def _sensor_source(model: Model) -> str:
         call += "".join(f", s[at + {i}]" for i in range(len(own)))
         J = _Jacobian(H, "H")
         seen = [f"h{i}" for i in range(sensor.width)]
-        functions += [function(f"scalar_h{index}", arguments, names, list(h)), function(f"scalar_h{index}_H", arguments, names, list(h) + J.outputs)]
+        functions += [
+            function(f"scalar_h{index}", arguments, names, list(h)),
+            function(f"scalar_h{index}_H", arguments, names, list(h) + J.outputs),
+        ]
         guard = f"if sensor == {index}:" if len(model.sensors) > 1 else "if True:"
         measure += [guard, "    " + _unpack(seen, f"scalar_h{index}({call})")]
         measure += [f"    out[row + {i}] = " + (f"h{i}" if i < sensor.width else "nan") for i in range(model.width)]
         innovate += [guard, "    " + _unpack(seen + J.names, f"scalar_h{index}_H({call})")]
         for i, angle in enumerate(sensor.is_angle):
             difference = f"z[row + {i}] - h{i}"
-            innovate.append(f"    nu[out + {i}] = " + (f"wrap_angle({difference})" if angle else difference))
+            difference = f"wrap_angle({difference})" if angle else difference
+            innovate.append(f"    nu[out + {i}] = unless_missing(z[row + {i}], {difference})")
             innovate.append(f"    store(H, (out + {i}) * {model.n}, {J.dense_row(i)})")
         innovate += [f"    nu[out + {i}] = nan" for i in range(sensor.width, model.width)]
     if not model.sensors:
         measure, innovate = ["pass"], ["pass"]
-    return "".join(functions) + _inline("measure_into(sensor, t, x, p, s, at, out, row)", *measure) + _inline("innovate(sensor, t, x, p, s, at, z, row, nu, H, out)", *innovate)
+    return (
+        "".join(functions)
+        + _inline("measure_into(sensor, t, x, p, s, at, out, row)", *measure)
+        + _inline("innovate(sensor, t, x, p, s, at, z, row, nu, H, out)", *innovate)
+    )

@@ -57,7 +57,8 @@ class PlainEntry:
 
 
 @cache
-def _machine() -> Any:
+def _prepare() -> None:
+    """Make LLVM ready to load code for this machine, once."""
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
@@ -66,16 +67,17 @@ def _machine() -> Any:
     for name in _NEVER_CALLED:
         if llvm.address_of_symbol(name) is None:
             llvm.add_symbol(name, anywhere)
-    return llvm.Target.from_default_triple().create_target_machine()
 
 
 def load_objects(objects: Mapping[str, bytes], symbols: Mapping[str, tuple[str, tuple[str, ...]]]) -> dict[str, Entry]:
     """Entries by name from object files and, for each, its symbol and the kinds of its arguments."""
     import llvmlite.binding as llvm
 
+    _prepare()
     entries = {}
     for name, code in objects.items():
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        machine = llvm.Target.from_default_triple().create_target_machine()  # the engine's own: it is freed with it
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
         symbol, kinds = symbols[name]

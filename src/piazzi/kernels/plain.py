@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import acos, asin, atan, atan2, cos, cosh, exp, fabs, inf, isnan, log, nan, pi, pow, sin, sinh, sqrt, tan, tanh  # noqa: A004
+from math import inf, isnan, nan, pi
 from typing import Any
 
 import numpy as np
+
+# NumPy's, because `math` raises where C gives NaN or infinity
+from numpy import arccos as acos
+from numpy import arcsin as asin
+from numpy import arctan as atan
+from numpy import arctan2 as atan2
+from numpy import cos, cosh, exp, fabs, log, sin, sinh, sqrt, tan, tanh
+from numpy import power as pow  # noqa: A004
 
 Array = np.ndarray[Any, Any]
 Indices = np.ndarray[Any, Any]
@@ -94,4 +102,9 @@ def minimum(x: float, y: float) -> float:
 
 def wrap_angle(a: float) -> float:
     """The same angle in (-pi, pi]."""
-    return a - 2.0 * pi * np.ceil((a - pi) / (2.0 * pi))
+    return a - 2.0 * pi * np.ceil((a - pi) / (2.0 * pi))  # type: ignore[no-any-return]
+
+
+def unless_missing(z: float, nu: float) -> float:
+    """The innovation `nu` of `z`; infinite where there is a `z` but its prediction has no value, so that the failure shows."""
+    return inf if isnan(nu) and not isnan(z) else nu

@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     import sympy as sp
 
 CALLS = {
-    **{name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sign")},
+    **{
+        name: name
+        for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sign")
+    },
     "Abs": "fabs",
     "Heaviside": "heaviside",
 }
@@ -65,7 +68,7 @@ class _Writer:
         if not e.free_symbols:
             return repr(float(e.evalf(25)))
         if e.is_Symbol:
-            return self.names[e]
+            return str(self.names[e])
         if e.is_Add:
             return self._sum(e)
         if e.is_Mul:
@@ -77,7 +80,7 @@ class _Writer:
     def _sum(self, e: sp.Expr) -> str:
         out = ""
         for term in sorted(e.as_ordered_terms(), key=self.depth):
-            coefficient, rest = term.as_coeff_Mul()
+            coefficient, _ = term.as_coeff_Mul()
             negative = coefficient.is_negative
             text = self._factor(-term if negative else term)
             out += (" - " if out else "-") + text if negative else (" + " if out else "") + text
@@ -153,5 +156,5 @@ def function(name: str, arguments: Sequence[str], names: Mapping[sp.Symbol, str]
     for i, (temporary, value) in enumerate(shared):
         writer.name(temporary, f"c{i}", value)
     results = [writer.text(e) for e in reduced]
-    body = writer.lines + [f"return ({', '.join(results)},)"]
+    body = [*writer.lines, f"return ({', '.join(results)},)"]
     return f"@inline\ndef {name}({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in body) + "\n\n"

@@ -71,11 +71,9 @@ def _surroundings() -> tuple[str, ...]:
 
     import llvmlite.binding as llvm
 
-    files = sorted([*HERE.rglob("*.py"), HERE.parent / "expressions.py", *(HERE.parent / "model").glob("*.py")])
     text = hashlib.sha256()
-    for file in files:
-        if file.is_file():
-            text.update(file.name.encode() + b"\0" + file.read_bytes())
+    for file in sorted(f for stage in ("expressions", "model", "kernels") for f in (HERE.parent / stage).rglob("*.py")):
+        text.update(file.name.encode() + b"\0" + file.read_bytes())
     features = llvm.get_host_cpu_features().flatten()
     packages = [f"{p} {version(p)}" for p in ("numba", "llvmlite", "sympy")]
     return (text.hexdigest(), sys.version, platform.machine(), llvm.get_host_cpu_name(), features, *packages)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any
 
 from piazzi.kernels.plain import *  # noqa: F403
-from piazzi.kernels.plain import Array, Indices
 
 ND: int
 N: int
@@ -44,8 +43,10 @@ chain_cost: Any
 
 marginal_covariances: Any
 forward: Any
-forward_following: Any
 record_epoch: Any
+retire: Any
+settle: Any
+forward_following: Any
 Q_matrix: Any
 back_through_epoch: Any
 backward: Any

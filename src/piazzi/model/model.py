@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from piazzi.expressions import names
-from piazzi.model.sensor import Parameter, Sensor, name_of, text_of
+from piazzi.model.sensor import Parameter, Sensor, name_of, several, text_of
 
 TIME = "t"
 STEP = "dt"
@@ -57,14 +57,21 @@ class Model:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "states", tuple(name_of(s, "state") for s in self.states))
+        put(self, "states", tuple(name_of(s, "state") for s in several(self.states, "states")))
         put(self, "parameters", tuple(_parameter(p) for p in _items(self.parameters)))
-        put(self, "sensors", tuple([self.sensors] if isinstance(self.sensors, Sensor) else self.sensors))
+        put(self, "sensors", self._sensors())
         put(self, "dynamics", self._equations())
         put(self, "groups", tuple((str(g), tuple(str(s) for s in members)) for g, members in dict(self.groups).items()))
         put(self, "units", tuple((str(s), str(u)) for s, u in dict(self.units).items()))
         self._check_names()
         self._check_equations()
+
+    def _sensors(self) -> tuple[Sensor, ...]:
+        given = (self.sensors,) if isinstance(self.sensors, Sensor) else tuple(self.sensors)
+        for sensor in given:
+            if not isinstance(sensor, Sensor):
+                raise ValueError(f"sensors has {sensor!r}; it must be a Sensor(name, equations)")
+        return given
 
     def _equations(self) -> tuple[str, ...]:
         given = self.dynamics
@@ -77,9 +84,11 @@ class Model:
             if missing:
                 raise ValueError(f"dynamics has no equation for state {missing[0]!r}")
             given = tuple(by_name[s] for s in self.states)
-        equations = tuple(text_of(e) for e in given)
+        equations = tuple(text_of(e) for e in several(given, "dynamics"))
         if len(equations) != len(self.states):
-            raise ValueError(f"dynamics has {len(equations)} equations for {len(self.states)} states ({', '.join(self.states)})")
+            raise ValueError(
+                f"dynamics has {len(equations)} equations for {len(self.states)} states ({', '.join(self.states)})"
+            )
         return equations
 
     def _check_names(self) -> None:
@@ -110,6 +119,9 @@ class Model:
             for name in sorted(names(equation) - allowed):
                 hint = nearest(name, sorted(allowed))
                 raise ValueError(f"dynamics of {state!r} uses {name!r}, which is neither a state nor a parameter{hint}")
+        for sensor in self.sensors:
+            if STEP in sensor.free_names:
+                raise ValueError(f"sensor {sensor.name!r} uses {STEP!r}, the length of a step, which no measurement has")
 
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:
@@ -154,7 +166,12 @@ class Model:
 
     def numbers(self, sensor: Sensor) -> tuple[str, ...]:
         """Names of the numbers that a station with this sensor must give, in alphabetical order."""
-        return tuple(sorted(sensor.free_names - {*self.states, *self.parameter_names, TIME}))
+        return self._numbers[sensor.name]
+
+    @cached_property
+    def _numbers(self) -> dict[str, tuple[str, ...]]:
+        taken = {*self.states, *self.parameter_names, TIME}
+        return {sensor.name: tuple(sorted(sensor.free_names - taken)) for sensor in self.sensors}
 
     def unit(self, name: str) -> str:
         """Unit of a state or an estimated constant, "" where none was given."""
@@ -171,7 +188,7 @@ class Model:
 def _items(parameters: Any) -> list[Any]:
     if isinstance(parameters, Mapping):
         return [Parameter(name_of(k, "parameter"), v) for k, v in parameters.items()]
-    return list(parameters)
+    return list(several(parameters, "parameters"))
 
 
 def _parameter(given: Any) -> Parameter:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal, get_args
 
-from piazzi.expressions import from_sympy, names
+from piazzi.expressions import from_sympy, is_name, names
 
 Role = Literal["fixed", "estimated", "considered"]
 
@@ -22,9 +23,18 @@ def text_of(equation: Any) -> str:
 def name_of(symbol: Any, what: str) -> str:
     """Name of a SymPy symbol, or the text itself; raises ValueError unless it can name a variable in an equation."""
     name = str(symbol)
-    if not name.isidentifier() or name.startswith("_") or "__" in name or names(name) != {name}:
-        raise ValueError(f"{what} {name!r} cannot be used as a name: write a letter followed by letters, digits and single underscores")
+    if not is_name(name):
+        raise ValueError(
+            f"{what} {name!r} cannot be used as a name: write a letter followed by letters, digits and single underscores"
+        )
     return name
+
+
+def several(given: Any, what: str) -> tuple[Any, ...]:
+    """The given names as a tuple; raises ValueError for one text, whose letters would be taken for names."""
+    if isinstance(given, str):
+        raise ValueError(f"{what} is {given!r}; it must be a list, such as [{given!r}]")
+    return tuple(given)
 
 
 @dataclass(frozen=True)
@@ -72,42 +82,49 @@ class Sensor:
     components: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "name", str(self.name))
         name_of(self.name.replace("-", "_"), "sensor")
+        put(self, "angles", several(self.angles, f"sensor {self.name!r}: angles"))
         labelled = self._labelled()
         if not labelled:
             raise ValueError(f"sensor {self.name!r} has no equations")
-        components = tuple(labelled)
-        for what, given in (("angles", self.angles), ("units", self.units)):
+        put(self, "components", tuple(labelled))
+        put(self, "equations", tuple(labelled.values()))
+        units = dict(self.units)
+        known = ", ".join(labelled)
+        for what, given in (("angles", self.angles), ("units", units)):
             for component in given:
                 if component not in labelled:
-                    raise ValueError(f"sensor {self.name!r}: {what} names {component!r}; its components are {', '.join(components)}")
-        units = {c: self.units.get(c, "rad" if c in self.angles else "") for c in components}
-        object.__setattr__(self, "equations", tuple(labelled.values()))
-        object.__setattr__(self, "angles", tuple(self.angles))
-        object.__setattr__(self, "components", components)
-        object.__setattr__(self, "units", tuple(units.items()))
+                    raise ValueError(f"sensor {self.name!r}: {what} names {component!r}; its components are {known}")
+        put(self, "units", tuple((c, units.get(c, "rad" if c in self.angles else "")) for c in labelled))
 
     def _labelled(self) -> dict[str, str]:
         """Component names with the text of their equations."""
         if isinstance(self.equations, Mapping):
             return {name_of(k, "component"): text_of(v) for k, v in self.equations.items()}
         given: Sequence[Any] = [self.equations] if isinstance(self.equations, str) else list(self.equations)
-        if len(given) == 1:
-            return {self.name.replace("-", "_"): text_of(given[0])}
-        marked = list(self.angles)
-        return {marked[i] if i < len(marked) and len(marked) == len(given) else f"{self.name}_{i}": text_of(e) for i, e in enumerate(given)}
+        return dict(zip(self._labels(len(given)), map(text_of, given), strict=True))
+
+    def _labels(self, count: int) -> tuple[str, ...]:
+        """Names for equations given without: the sensor's own, the angles' where all are angles, else numbered."""
+        if count == 1:
+            return (self.name.replace("-", "_"),)
+        if len(set(self.angles)) == count:
+            return self.angles
+        return tuple(f"{self.name}_{i}" for i in range(count))
 
     @property
     def width(self) -> int:
         """Number of components."""
         return len(self.components)
 
-    @property
+    @cached_property
     def is_angle(self) -> tuple[bool, ...]:
         """For every component, whether it is an angle."""
         return tuple(c in self.angles for c in self.components)
 
-    @property
+    @cached_property
     def free_names(self) -> frozenset[str]:
         """All names in the equations."""
         return frozenset().union(*(names(e) for e in self.equations))

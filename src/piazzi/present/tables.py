@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.estimate import Estimate
 from piazzi.evaluate.metrics import errors
-from piazzi.evaluate.quantities import display_of, duration, with_sigma
+from piazzi.evaluate.quantities import display_of, duration, number, with_sigma
 from piazzi.problem import Problem, Tracking
 
 
@@ -34,13 +34,14 @@ def _count(many: int, what: str) -> str:
 def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
     """A rich table of every state at epoch `k` with its standard deviation, and its error where the truth is known."""
     from rich import box
+    from rich.console import Group
     from rich.table import Table
     from rich.text import Text
 
     error = errors(estimate)
     view = "with later measurements too" if estimate.view == "delayed" else "from measurements up to then"
     title = f"State at t = {estimate.times[k]:g} s, {name}, {view}"
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), header_style="bold", title=Text(title), title_justify="left")
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     table.add_column("state", no_wrap=True)
     for heading in ("estimate", "sigma", *(["error"] if error is not None else [])):
         table.add_column(heading, justify="right", no_wrap=True)
@@ -54,4 +55,23 @@ def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
             e = float(error[k, i]) * show.factor
             texts.append(with_sigma(e, sigma * show.factor)[0] if np.isfinite(e) else "-")
         table.add_row(Text(state), *texts, Text(show.unit))
+    return Group(Text(title, style="bold"), table)
+
+
+def truth_table(problem: Problem, tracking: Tracking) -> Any:
+    """A rich table of the true state at the first and last epoch."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    table.add_column("true state", no_wrap=True)
+    for t in (tracking.times[0], tracking.times[-1]):
+        table.add_column(f"t = {t:g} s", justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    if tracking.truth is not None:
+        for i, state in enumerate(problem.model.names[: tracking.truth.shape[1]]):
+            ends = [float(tracking.truth[0, i]), float(tracking.truth[-1, i])]
+            show = display_of(problem.model.unit(state), ends)
+            table.add_row(Text(state), *(number(v * show.factor, 6) for v in ends), Text(show.unit))
     return table

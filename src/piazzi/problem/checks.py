@@ -62,7 +62,9 @@ def _check_symmetric(a: Array, what: str, names: Sequence[str]) -> None:
     off = np.abs(a - a.T) > 1e-9 * scale
     if off.any():
         i, j = np.argwhere(off)[0]
-        raise ValueError(f"{what} is not symmetric: ({names[i]}, {names[j]}) is {a[i, j]:g} and ({names[j]}, {names[i]}) is {a[j, i]:g}")
+        raise ValueError(
+            f"{what} is not symmetric: ({names[i]}, {names[j]}) is {a[i, j]:g} and ({names[j]}, {names[i]}) is {a[j, i]:g}"
+        )
 
 
 def _check_definite(a: Array, what: str, names: Sequence[str], definite: bool) -> None:

@@ -36,14 +36,17 @@ def _rates(problem: Problem, entry: str, x: Any, t: Any, shape: tuple[int, ...])
 
 
 def dynamics(problem: Problem, x: Any, t: Any) -> Array:
+    """dx/dt, same shape as the states."""
     return _rates(problem, "evaluate_dynamics", x, t, (problem.model.n,))
 
 
 def dynamics_jacobian(problem: Problem, x: Any, t: Any) -> Array:
+    """F = df/dx, (n, n) or (K, n, n)."""
     return _rates(problem, "evaluate_dynamics_jacobian", x, t, (problem.model.n, problem.model.n))
 
 
 def step(problem: Problem, x: Any, dt: float, t: Any) -> tuple[Array, Array]:
+    """Next states and the derivative of the step."""
     assert problem.integrator is not None
     many, times, one = _states(problem, x, t)
     n, count = problem.model.n, int(problem.integrator.counts(np.array([float(dt)]))[0])
@@ -54,16 +57,20 @@ def step(problem: Problem, x: Any, dt: float, t: Any) -> tuple[Array, Array]:
 
 
 def measure(problem: Problem, station: str, x: Any, t: Any) -> Array:
+    """h of one station, (m,) or (K, m)."""
     s = problem.station_index(station)
     many, times, one = _states(problem, x, t)
     out = np.empty((len(many), problem.model.width))
     library = kernels.load(problem.spec("transition", "functions"))
-    library.evaluate_measurement(len(many), int(problem.station_sensor[s]), times, many, problem.given, problem.station_numbers[s], out)
+    library.evaluate_measurement(
+        len(many), int(problem.station_sensor[s]), times, many, problem.given, problem.station_numbers[s], out
+    )
     out = out[:, : len(problem.stations[s].noise)]
     return out[0] if one else out
 
 
 def measurement_jacobian(problem: Problem, station: str, x: Any, t: Any) -> Array:
+    """H = dh/dx of one station, (m, n) or (K, m, n)."""
     s, m, n = problem.station_index(station), problem.model.width, problem.model.n
     many, times, one = _states(problem, x, t)
     out, nu, H = np.empty((len(many), m, n)), np.zeros(m), np.zeros((m, n))

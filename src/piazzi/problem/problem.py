@@ -98,7 +98,10 @@ class Problem:
         wanted = self.model.numbers(self.model.sensor(station.sensor))
         for name in station.numbers:
             if name not in wanted:
-                raise ValueError(f"station {station.name!r} gives {name!r}, which sensor {station.sensor!r} does not use{nearest(name, wanted)}")
+                raise ValueError(
+                    f"station {station.name!r} gives {name!r}, which sensor {station.sensor!r} does not use"
+                    f"{nearest(name, wanted)}"
+                )
         for name in wanted:
             if name not in station.numbers:
                 raise ValueError(f"station {station.name!r} gives no value for {name!r}, which sensor {station.sensor!r} uses")

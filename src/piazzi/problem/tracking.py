@@ -44,7 +44,7 @@ class Tracking:
 
     row_times: Any
     values: Any
-    row_stations: Sequence[str] | None = None
+    row_stations: Any = None
     truth: Any = None
     epoch: str = ""
 
@@ -82,7 +82,10 @@ class Tracking:
         bad = np.argwhere(np.isinf(values))
         if bad.size:
             k, i = bad[0]
-            raise ValueError(f"measurement of row {k} (t = {self.row_times[k]:g} s), component {i}, is {values[k, i]}; write NaN for a missing one")
+            raise ValueError(
+                f"measurement of row {k} (t = {self.row_times[k]:g} s), component {i}, is {values[k, i]}; "
+                "write NaN for a missing one"
+            )
         if np.isnan(values).all():
             raise ValueError("there are no measurements: every value is missing")
         return frozen(values)
@@ -138,7 +141,10 @@ class Tracking:
         if bad.size:
             k = int(bad[0, 0])
             station = problem.stations[index[k]]
-            raise ValueError(f"row {k} (t = {self.row_times[k]:g} s) has more values than the {widths[index[k]]} components of station {station.name!r}")
+            raise ValueError(
+                f"row {k} (t = {self.row_times[k]:g} s) has more values than the {widths[index[k]]} components "
+                f"of station {station.name!r}"
+            )
 
     def padded(self, width: int) -> Array:
         """Values with exactly `width` columns, NaN where there were fewer."""

@@ -182,7 +182,7 @@ def _sensor(name: str, table: Table, units: Units, out: Physics) -> Sensor | Non
     with table.faults.at(table.path):
         sensor = Sensor(name, equations, tuple(angles), {k: u.label for k, u in kinds.items() if u.label})
         for unused in sorted(numbers.keys() - sensor.free_names):
-            table.fault("numbers", f"names {unused!r}, which no equation of the sensor uses{nearest(unused, sorted(sensor.free_names))}")
+            table.fault("numbers", f"names {unused!r}, which no equation uses{nearest(unused, sorted(sensor.free_names))}")
         return sensor
     return None
 

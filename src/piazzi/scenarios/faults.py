@@ -55,7 +55,8 @@ def shown(value: Any) -> str:
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, list):
-        return f"a list of {len(value)}" if len(value) > 4 or any(isinstance(v, dict | list) for v in value) else one_line(repr(value))
+        short = len(value) <= 4 and not any(isinstance(v, dict | list) for v in value)
+        return one_line(repr(value)) if short else f"a list of {len(value)}"
     text = repr(value) if not isinstance(value, int) or abs(value) < 10**20 else "a number of more than 20 digits"
     return one_line(text if len(text) <= 60 else text[:57] + "...")
 

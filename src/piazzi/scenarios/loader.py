@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from piazzi.model import nearest
-from piazzi.scenarios.faults import Fault, Faults, ScenarioError, one_line
+from piazzi.scenarios.faults import Fault, Faults, ScenarioError, shown
 from piazzi.scenarios.read import read_scenario
 from piazzi.scenarios.scenario import Scenario
 
@@ -31,7 +31,7 @@ def show(name: str = TEMPLATE) -> str:
     """The commented text of a built-in scenario, or of "template", to start from; raises ValueError for an unknown name."""
     known = [*names(), TEMPLATE]
     if name not in known:
-        raise ValueError(f"unknown scenario {one_line(name)!r}{nearest(name[:60], known)}")
+        raise ValueError(f"unknown scenario {shown(name)}{nearest(name[:60], known)}")
     return (FILES / f"{name}.toml").read_text(encoding="utf-8")
 
 
@@ -80,7 +80,8 @@ def _built_in(name: str) -> Scenario:
 
 def _read(path: Path) -> tuple[Scenario | None, list[Fault]]:
     if path.suffix != ".toml" and not path.exists():
-        raise ValueError(f"unknown scenario {one_line(str(path))!r}{nearest(str(path)[:60], names())} (or give the path of a .toml file)")
+        hint = nearest(path.name[:60], names())
+        raise ValueError(f"there is no file or scenario {shown(os.fspath(path))}{hint}")
     faults = Faults()
     data = _tables(path, faults)
     scenario = read_scenario(data, path.stem, faults) if not faults else None

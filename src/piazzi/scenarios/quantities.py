@@ -69,9 +69,9 @@ def read_noise(table: Table, physics: Physics) -> ProcessNoise | None:
     """Process noise of the states, or of states and estimated constants; names that a table leaves out have none."""
     names = physics.states
     everything = [*names, *physics.constants]
-    for key in SPREADS:
-        value = table.raw(key)
-        if isinstance(value, list) and len(value) == len(everything) or isinstance(value, Mapping) and set(value) & set(physics.constants):
+    for value in map(table.raw, SPREADS):
+        whole = isinstance(value, list) and len(value) == len(everything)
+        if whole or (isinstance(value, Mapping) and not set(physics.constants).isdisjoint(value)):
             names = everything
     per = table.text("per", "second", ("second", "step"))
     method = table.text("method", "integral", ("integral", "scaled"))
@@ -98,7 +98,8 @@ def read_station(table: Table, physics: Physics) -> Station | None:
         return None
     components, own = physics.components[sensor], physics.numbers[sensor]
     if not isinstance(table.raw("noise"), Mapping):
-        table.fault("noise", f"must be a table, such as {{ sigma = {[1.0] * len(components) if len(components) > 1 else 1.0} }}")
+        example = [1.0] * len(components) if len(components) > 1 else 1.0
+        table.fault("noise", f"must be a table, such as {{ sigma = {example} }}")
         R = None
     else:
         noise = table.table("noise")
@@ -118,6 +119,7 @@ def read_station(table: Table, physics: Physics) -> Station | None:
 
 
 def read_stations(file: Table, physics: Physics) -> list[Station | None]:
+    """All stations, None for those that are faulty."""
     stations = [read_station(table, physics) for table in file.array("stations")]
     seen: set[str] = set()
     for i, station in enumerate(stations):

@@ -65,9 +65,7 @@ def read_problem(file: Table, name: str, units: Units) -> Problem | None:
     if len(file.faults) > before or physics.model is None or prior is None:
         return None
     with file.faults.at(""):
-        return Problem(
-            physics.model, prior, noise, [s for s in stations if s], parameters, integrator, prior_time, truth, name
-        )
+        return Problem(physics.model, prior, noise, [s for s in stations if s], parameters, integrator, prior_time, truth, name)
     return None
 
 

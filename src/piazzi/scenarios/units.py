@@ -42,7 +42,7 @@ _FACTOR = re.compile(r"\s*(?:1|([A-Za-z]+)\s*(?:\^\s*([+-]?\d{1,2}(?:\.\d{1,3})?
 
 @dataclass(frozen=True)
 class Unit:
-    """`factor` turns numbers into SI; `powers` are the exponents of length, angle, time and mass; `label` is the SI unit's name."""
+    """What turns numbers into SI, the exponents of length, angle, time and mass, and the name of the SI unit."""
 
     factor: float
     powers: tuple[Fraction, ...]
@@ -97,7 +97,7 @@ class Units:
         for joint, part in zip(["*", *rest[::2]], [first, *rest[1::2]], strict=True):
             match = _FACTOR.fullmatch(part)
             if match is None:
-                raise ValueError(f"{text[:80]!r} is no unit: write a product such as 'km/s' or 'length**3/time**2', or '1' for none")
+                raise ValueError(f"{text[:80]!r} is no unit: write a product such as 'km/s' or 'length**3/time**2', or '1'")
             if match[1] is None:
                 continue
             value, base = self._named(match[1])
@@ -143,7 +143,8 @@ def label(powers: Sequence[Fraction]) -> str:
     """Name of the SI unit with these exponents, such as "m^3/s^2"; "" for none."""
 
     def product(sign: int) -> str:
-        used = [(name, sign * p) for name, p in zip(("kg", "m", "rad", "s"), (powers[3], *powers[:3]), strict=True) if sign * p > 0]
+        named = zip(("kg", "m", "rad", "s"), (powers[3], *powers[:3]), strict=True)
+        used = [(name, sign * p) for name, p in named if sign * p > 0]
         return " ".join(name if p == 1 else f"{name}^{float(p):g}" for name, p in used)
 
     above, below = product(1), product(-1)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.model import Model, Sensor
+from piazzi.model import Model, Parameter, Sensor
 from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Truth
 from piazzi.scenarios.faults import Faults, ScenarioError
 from piazzi.scenarios.integrators import write_integrator
@@ -15,7 +15,10 @@ from piazzi.scenarios.read import read_problem
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import Labels
 
-SECTIONS = ("states", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise", "integrator", "truth")
+SECTIONS = (
+    "states", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise", "integrator",
+    "truth",
+)  # fmt: skip
 
 
 def problem_to_tables(problem: Problem) -> dict[str, Any]:
@@ -29,7 +32,7 @@ def problem_to_tables(problem: Problem) -> dict[str, Any]:
     assert problem.integrator is not None
     tables: dict[str, Any] = {
         **_equations(problem.model),
-        "parameters": {p.name: _parameter(problem.parameters[p.name], p.role, problem.model.unit(p.name)) for p in problem.model.parameters},
+        "parameters": {p.name: _parameter(problem, p) for p in problem.model.parameters},
         "stations": [_station(s) for s in problem.stations],
         "prior": {"mean": _listed(problem.prior.mean), "covariance": _listed(problem.prior.covariance)},
         "process_noise": _noise(problem.process_noise),
@@ -44,7 +47,7 @@ def problem_to_tables(problem: Problem) -> dict[str, Any]:
 
 
 def problem_from_tables(tables: Mapping[str, Any], name: str, source: str) -> Problem:
-    """The problem that `problem_to_tables` wrote, checked like any file; raises ScenarioError (a ValueError) with all faults."""
+    """The problem that `problem_to_tables` wrote, checked like any file; raises ScenarioError with all faults."""
     faults = Faults()
     file = Table(tables, "", faults)
     with np.errstate(all="ignore"):
@@ -72,10 +75,11 @@ def _sensor(model: Model, sensor: Sensor) -> dict[str, Any]:
     }
 
 
-def _parameter(value: Any, role: str, unit: str) -> dict[str, Any]:
+def _parameter(problem: Problem, parameter: Parameter) -> dict[str, Any]:
+    value, kind = problem.parameters[parameter.name], {"role": parameter.role, "unit": problem.model.unit(parameter.name)}
     if isinstance(value, Gaussian):
-        return {"value": float(value.mean[0]), "variance": float(value.covariance[0, 0]), "role": role, "unit": unit}
-    return {"value": float(value), "role": role, "unit": unit}
+        return {"value": float(value.mean[0]), "variance": float(value.covariance[0, 0]), **kind}
+    return {"value": float(value), **kind}
 
 
 def _station(station: Station) -> dict[str, Any]:

@@ -5,7 +5,6 @@ Forward, a linearised Kalman filter over the deviations from the current states;
 d_k - P_k lambda_k, with d and P predicted and lambda the multiplier before the measurements of epoch k.
 """
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
@@ -141,6 +140,8 @@ def backward(a, W, first_row, Phi, nu, H, damping, tether, d_pred, P_pred, gains
             lam = lam @ load_matrix(Phi, j * N * N, N, N)
         d = load_vector(d_pred, j * N, N)
         P = load_matrix(P_pred, j * N * N, N, N)
-        lam = back_through_epoch((first_row[k] - base) * M, (first_row[k + 1] - base) * M, lam, d, P, nu, H, damping, tether, gains)
+        lam = back_through_epoch(
+            (first_row[k] - base) * M, (first_row[k + 1] - base) * M, lam, d, P, nu, H, damping, tether, gains
+        )
         store(multiplier, j * N, lam)
         store(dx, j * N, d - lam @ P)

@@ -1,6 +1,5 @@
 """Measurements with unit noise."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

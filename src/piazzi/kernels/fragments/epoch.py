@@ -1,6 +1,5 @@
 """All measurements of one epoch."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
@@ -16,7 +15,9 @@ def record(row, nu, H, P, R, at, innovation, innovation_covariance):
 
 
 @inline
-def update_epoch(first, last, t, x, P, p, z, station, sensor, numbers, R, correlated, nu, H, work, innovation, innovation_covariance):
+def update_epoch(
+    first, last, t, x, P, p, z, station, sensor, numbers, R, correlated, nu, H, work, innovation, innovation_covariance
+):
     """All rows of one epoch, linearised once, at the predicted state: so they commute."""
     P_pred = P
     d = unit(-1, N)

@@ -1,6 +1,5 @@
 """The extended Kalman filter over a whole run (Jazwinski 1970, ch. 8; Joseph-form update)."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
@@ -40,7 +39,23 @@ def run_filter(
             P = Phi @ P @ Phi.T + Q_step
         before = t[k]
         x, P = update_epoch(
-            first_row[k], first_row[k + 1], t[k], x, P, p, z, station, sensor, numbers, R, correlated, nu, H, work, innovation, innovation_covariance
+            first_row[k],
+            first_row[k + 1],
+            t[k],
+            x,
+            P,
+            p,
+            z,
+            station,
+            sensor,
+            numbers,
+            R,
+            correlated,
+            nu,
+            H,
+            work,
+            innovation,
+            innovation_covariance,
         )
         store(mean, k * N, x)
         P = symmetric(P)

@@ -1,6 +1,5 @@
 """The model's own functions on many states at once, for users."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
@@ -11,7 +10,9 @@ def evaluate_measurement(K: int, sensor: int, t: Array, x: Array, p: Array, numb
 
 
 @entry
-def evaluate_measurement_jacobian(K: int, sensor: int, t: Array, x: Array, p: Array, numbers: Array, nu: Array, H: Array, out: Array) -> None:
+def evaluate_measurement_jacobian(
+    K: int, sensor: int, t: Array, x: Array, p: Array, numbers: Array, nu: Array, H: Array, out: Array
+) -> None:
     for i in range(M * N):
         H[i] = 0.0
     for k in range(K):

@@ -1,6 +1,5 @@
 """The full factor graph: linearise and cost, solve, covariances.  Python decides about steps in between."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
@@ -109,7 +108,9 @@ def graph_solve(
 ) -> None:
     m_now = load_vector(m, 0, N)
     P_first = load_matrix(P0, 0, N, N)
-    _, P, fit = forward(0, K, x, scale, first_row, Q_matrix(Q), Q_all, f, Phi, nu, H, m_now, P_first, damping, tether, d_pred, P_pred)
+    _, P, fit = forward(
+        0, K, x, scale, first_row, Q_matrix(Q), Q_all, f, Phi, nu, H, m_now, P_first, damping, tether, d_pred, P_pred
+    )
     store(P_last, 0, P)
     report[5] = fit
     backward(0, K, first_row, Phi, nu, H, damping, tether, d_pred, P_pred, gains, multiplier, dx)
@@ -154,7 +155,9 @@ def graph_marginals(
     report: Array,
 ) -> None:
     last = load_matrix(P_last, 0, N, N)
-    marginal_covariances(0, K, scale, first_row, Q_matrix(Q), Q_all, Phi, nu, H, P_pred, last, L, X, keep_cross, covariance, cross)
+    marginal_covariances(
+        0, K, scale, first_row, Q_matrix(Q), Q_all, Phi, nu, H, P_pred, last, L, X, keep_cross, covariance, cross
+    )
     largest = 0.0
     for j in range(K):
         for i in range(N):
@@ -185,8 +188,24 @@ def graph_innovations(
     innovation_covariance: Array,
 ) -> None:
     for k in range(K):
-        record_epoch(k, t, first_row, z, station, sensor, numbers, R, p, load_vector(x, k * N, N), load_vector(d_pred, k * N, N),
-                     load_matrix(P_pred, k * N * N, N, N), nu, H, innovation, innovation_covariance)  # fmt: skip
+        record_epoch(
+            k,
+            t,
+            first_row,
+            z,
+            station,
+            sensor,
+            numbers,
+            R,
+            p,
+            load_vector(x, k * N, N),
+            load_vector(d_pred, k * N, N),
+            load_matrix(P_pred, k * N * N, N, N),
+            nu,
+            H,
+            innovation,
+            innovation_covariance,
+        )
 
 
 @entry

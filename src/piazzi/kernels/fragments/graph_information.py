@@ -1,6 +1,5 @@
 """The full graph solved in square-root information form."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
@@ -107,4 +106,3 @@ def graph_solve_information(
     report[4] = gradient
     report[6] = sqrt(largest)
     report[7] = report[6]
-

@@ -6,7 +6,6 @@ covariances are sums of congruences.  Unlike a covariance, R loses nothing when 
 magnitude between directions.
 """
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
@@ -81,7 +80,7 @@ def invert_triangle(R, out):
 
 @inline
 def triangularize(B, rows, columns, pivots):
-    """Householder reflections of the rows x columns array `B` that clear it below the diagonal of its first `pivots` columns."""
+    """Clear the rows x columns array `B` below the diagonal of its first `pivots` columns by Householder reflections."""
     for j in range(pivots):
         norm = 0.0
         for i in range(j, rows):

@@ -1,6 +1,5 @@
 """What each measurement added: its difference from the prediction by all others before it, and the variance of that."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

@@ -1,6 +1,5 @@
 """Linearised, whitened measurements of a stretch of states."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

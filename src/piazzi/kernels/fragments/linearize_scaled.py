@@ -1,6 +1,5 @@
 """Linearised dynamics of a stretch of states, `LANES` states at a time; process noise is a multiple of one matrix."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

@@ -1,53 +1,80 @@
-"""Covariances of all states given all measurements, as sums of congruences (Rauch, Tung and Striebel, in Joseph form)."""
+"""Covariances of all states given all measurements: what is known of each from before it and from after it.
 
-# ruff: noqa: F821
+Forward, the chain has the covariance of each state given the measurements up to it.  Back, the information matrix of the later
+ones is a sum of congruences, and is taken in as that many more measurements (Fraser and Potter 1969, without their inverses).
+Rauch, Tung and Striebel divide by the predicted covariance instead, which fails silently where a system without process noise
+forgets its past: P_pred turns singular.
+"""
+
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def solve_semidefinite(A, B, L, X):
-    """A^-1 B for symmetric A, row by row by L D L^T; a direction in which A is zero to rounding contributes nothing."""
-    store(L, 0, A)
-    store(X, 0, B)
+def directions(A, rows):
+    """Rows r_j with A = sum of r_j^T r_j, by Cholesky; a direction in which A is zero to rounding gives a row of zeros."""
+    store(rows, 0, A)
     for j in range(N):
-        pivot = L[j * N + j]
+        whole = rows[j * N + j]
+        row = load_vector(rows, j * N, N)
         for k in range(j):
-            pivot = pivot - L[j * N + k] * L[j * N + k] * L[k * N + k]
-        inverse = 1.0 / pivot if pivot > 1e-15 * L[j * N + j] else 0.0
-        row = load_vector(X, j * N, N)
-        for k in range(j):
-            row = row - L[j * N + k] * load_vector(X, k * N, N)
-        store(X, j * N, row)
-        for i in range(j + 1, N):
-            s = L[i * N + j]
-            for k in range(j):
-                s = s - L[i * N + k] * L[j * N + k] * L[k * N + k]
-            L[i * N + j] = s * inverse
-        L[j * N + j] = pivot if pivot > 1e-15 * L[j * N + j] else 0.0
-    for b in range(N):
-        i = N - 1 - b
-        row = (1.0 / L[i * N + i] if L[i * N + i] > 0.0 else 0.0) * load_vector(X, i * N, N)
-        for k in range(i + 1, N):
-            row = row - L[k * N + i] * load_vector(X, k * N, N)
-        store(X, i * N, row)
-    return load_matrix(X, 0, N, N)
+            row = row - rows[k * N + j] * load_vector(rows, k * N, N)
+        store(rows, j * N, row)
+        pivot = rows[j * N + j]
+        store(rows, j * N, (1.0 / sqrt(pivot) if pivot > 1e-15 * whole else 0.0) * row)
 
 
 @inline
-def marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P_last, L, X, keep_cross, covariance, cross):
+def information_before(first, last, nu, H, Y):
+    """Information about a state with that of its own measurements added."""
+    for c in range(first, last):
+        if not isnan(nu[c]):
+            h = load_vector(H, c * N, N)
+            Y = Y + outer(h, h)
+    return Y
+
+
+@inline
+def forget(Y, T, noise, amount):
+    """Information about a state as information about the one it had been without its process noise; T collects the steps.
+
+    One direction g of the noise at a time: (I - k g^T) Y (I - g k^T) + k k^T with k = Y g / (1 + g^T Y g).
+    """
+    for i in range(N):
+        if noise[i * N + i] > 0.0:
+            g = sqrt(amount) * load_vector(noise, i * N, N)
+            u = g @ Y
+            k = (1.0 / (1.0 + g @ u)) * u
+            B = Y - outer(u, k)
+            Y = B + outer(k, k - g @ B)
+            T = T - outer(T @ g, k)
+    return Y, T
+
+
+@inline
+def marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P_last, rows, g, keep_cross, covariance, cross):
     """Covariance of each state a ... a + W - 1 into its place; of state k with state k + 1 into `cross` where wanted."""
     base = first_row[a]
-    P_s = P_last
-    store(covariance, (a + W - 1) * N * N, symmetric(P_s))
+    store(covariance, (a + W - 1) * N * N, symmetric(P_last))
+    Y = 0.0 * P_last
+    directions(Q, g)
     for b in range(1, W):
         j = W - 1 - b
         k = a + j
+        Y = information_before((first_row[k + 1] - base) * M, (first_row[k + 2] - base) * M, nu, H, Y)
+        amount = scale[k + 1]
+        if noise_varies():
+            directions(noise_at(j + 1, amount, Q, Q_all), g)
+            amount = 1.0
+        Y, T = forget(Y, identity(N), g, amount)
+        F = load_matrix(Phi, j * N * N, N, N)
+        Y = symmetric(F.T @ Y @ F)
         P = load_matrix(P_pred, j * N * N, N, N)
         _, P, _ = absorb_epoch((first_row[k] - base) * M, (first_row[k + 1] - base) * M, unit(-1, N), P, nu, H)
-        F = load_matrix(Phi, j * N * N, N, N)
-        G = solve_semidefinite(load_matrix(P_pred, (j + 1) * N * N, N, N), F @ P, L, X).T
-        A = identity(N) - G @ F
+        directions(Y, rows)
+        for i in range(N):
+            if rows[i * N + i] > 0.0:
+                _, P, _, _, _ = update_scalar(unit(-1, N), P, load_vector(rows, i * N, N), 0.0)
+        P = symmetric(P)
+        store(covariance, k * N * N, P)
         if keep_cross:
-            store(cross, k * N * N, G @ P_s)
-        P_s = symmetric(A @ P @ A.T + G @ (noise_at(j + 1, scale[k + 1], Q, Q_all) + P_s) @ G.T)
-        store(covariance, k * N * N, P_s)
+            store(cross, k * N * N, P @ (T @ F).T)

@@ -1,6 +1,5 @@
 """Process noise over a step as the integral of Phi Q Phi^T, for white noise of spectral density Q in continuous time."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

@@ -1,6 +1,5 @@
 """Process noise over a step as a multiple of one matrix: Q per step (scale 1), or Q dt (scale dt)."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

@@ -1,6 +1,5 @@
 """Rates of a continuous model on many states at once, for users."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

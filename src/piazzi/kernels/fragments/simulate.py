@@ -1,20 +1,17 @@
 """Draw a truth and its measurements: process noise is fed back into the state that is propagated and measured."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
 def factor_in_place(L):
     """Lower Cholesky factor of the semidefinite matrix in `L`; a direction without noise gets a zero column."""
-    largest = 0.0
-    for i in range(N):
-        largest = maximum(largest, L[i * N + i])
     for j in range(N):
-        pivot = L[j * N + j]
+        variance = L[j * N + j]
+        pivot = variance
         for k in range(j):
             pivot = pivot - L[j * N + k] * L[j * N + k]
-        pivot = sqrt(pivot) if pivot > 1e-14 * largest else 0.0
+        pivot = sqrt(pivot) if pivot > 1e-13 * variance else 0.0
         L[j * N + j] = pivot
         for i in range(j + 1, N):
             s = L[i * N + j]

@@ -1,6 +1,5 @@
 """From one epoch to the next, in substeps."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

@@ -1,6 +1,5 @@
 """One measurement of a belief, in place."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

@@ -1,6 +1,5 @@
 """Measurement update one component at a time; a full R is decorrelated first."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

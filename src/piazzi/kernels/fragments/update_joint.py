@@ -1,6 +1,5 @@
 """Measurement update with all components of a row at once."""
 
-# ruff: noqa: F821
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

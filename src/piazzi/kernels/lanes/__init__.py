@@ -1,6 +1,6 @@
 """Small vectors and matrices in SIMD registers, for Numba."""
 
-from piazzi.kernels.lanes import operators as _operators
+import piazzi.kernels.lanes.operators  # noqa: F401  (registers + - * @ with Numba)
 from piazzi.kernels.lanes.functions import heaviside, maximum, minimum, sign
 from piazzi.kernels.lanes.kinds import Matrix, Pack, Vector, element
 from piazzi.kernels.lanes.memory import (

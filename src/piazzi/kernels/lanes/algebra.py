@@ -39,6 +39,7 @@ def join(b: Any, ty: types.Type, parts: Sequence[Any]) -> Any:
 
 
 def parts(b: Any, v: Any) -> list[Any]:
+    """The entries of a vector, or the rows of a matrix."""
     return [get(b, v, i) for i in range(v.type.count)]
 
 
@@ -52,22 +53,23 @@ def zipped(b: Any, op: Callable[..., Any], *args: Any) -> Any:
     return out
 
 
-def widen(b: Any, have: types.Type, want: types.Type, v: Any) -> Any:
+def widen(b: Any, have: Any, want: Any, v: Any) -> Any:
     """A value of one problem as the same value in every lane; anything else unchanged."""
     if have == want or not isinstance(want, (Pack, Vector, Matrix)):
         return v
     if isinstance(want, Pack):
         return v if isinstance(have, Pack) else splat(b, v, want.w)
-    inner = element(want.w) if isinstance(want, Vector) else want.row
-    kind = element(have.w) if isinstance(want, Vector) else have.row
+    kind, inner = (element(ty.w) if isinstance(ty, Vector) else ty.row for ty in (have, want))
     return join(b, want, [widen(b, kind, inner, part) for part in parts(b, v)])
 
 
 def add(b: Any, x: Any, y: Any) -> Any:
+    """x + y, entry by entry."""
     return zipped(b, lambda u, v: b.fadd(u, v, flags=FUSE), x, y)
 
 
 def sub(b: Any, x: Any, y: Any) -> Any:
+    """x - y, entry by entry."""
     return zipped(b, lambda u, v: b.fsub(u, v, flags=FUSE), x, y)
 
 
@@ -90,6 +92,7 @@ def combine(b: Any, coefficients: Sequence[Any], rows: Sequence[Any]) -> Any:
 
 
 def transpose(b: Any, ty: Matrix, a: Any) -> Any:
+    """A^T."""
     rows = [parts(b, row) for row in parts(b, a)] if ty.w > 1 or max(ty.r, ty.n) > 8 else None
     target = Matrix(ty.n, ty.r, ty.w)
     if rows is not None:

@@ -57,6 +57,7 @@ def element(w: int) -> types.Type:
 
 
 def llvm_type(ty: types.Type) -> ir.Type:
+    """How LLVM holds a value of the type."""
     if isinstance(ty, Pack):
         return ir.VectorType(DOUBLE, ty.w)
     if isinstance(ty, Vector):
@@ -70,7 +71,7 @@ def _model(kind: type[types.Type]) -> None:
     @register_model(kind)
     class Model(models.PrimitiveModel):
         def __init__(self, manager: Any, ty: types.Type) -> None:
-            super().__init__(manager, ty, llvm_type(ty))
+            super().__init__(manager, ty, llvm_type(ty))  # type: ignore[no-untyped-call]
 
 
 for _kind in (Pack, Vector, Matrix):
@@ -78,6 +79,7 @@ for _kind in (Pack, Vector, Matrix):
 
 
 def lanes_of(ty: types.Type) -> int:
+    """Problems worked on at once; 1 for plain numbers."""
     return getattr(ty, "w", 1)
 
 
@@ -89,4 +91,5 @@ def wider(ty: types.Type, w: int) -> types.Type:
 
 
 def is_element(ty: types.Type) -> bool:
+    """Whether the type is a number or a pack of them."""
     return isinstance(ty, (types.Number, Pack))

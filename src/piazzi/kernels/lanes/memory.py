@@ -15,13 +15,16 @@ from piazzi.kernels.lanes.kinds import DOUBLE, Matrix, Vector, element, llvm_typ
 @intrinsic
 def vector(typing: Any, *entries: Any) -> Any:
     """The vector of these entries."""
-    kinds = entries[0] if len(entries) == 1 and isinstance(entries[0], types.BaseTuple) else entries
+    kinds: Any = entries[0] if len(entries) == 1 and isinstance(entries[0], types.BaseTuple) else entries
     w = max(getattr(kind, "w", 1) for kind in kinds)
     result, want = Vector(len(kinds), w), element(w)
 
     def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
         values = [get(b, args[0], i) for i in range(len(kinds))]
-        values = [context.cast(b, v, k, types.float64) if isinstance(k, types.Number) else v for v, k in zip(values, kinds, strict=True)]
+        values = [
+            context.cast(b, v, k, types.float64) if isinstance(k, types.Number) else v
+            for v, k in zip(values, kinds, strict=True)
+        ]
         return join(b, result, [widen(b, k, want, v) for v, k in zip(values, kinds, strict=True)])
 
     return result(types.StarArgTuple(kinds)), lower

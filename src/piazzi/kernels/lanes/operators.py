@@ -34,7 +34,7 @@ def _quotient(a: types.Type, c: types.Type) -> types.Type | None:
     return _same(a, c) if is_element(a) and is_element(c) else None
 
 
-def _matmul(a: types.Type, c: types.Type) -> types.Type | None:
+def _matmul(a: Any, c: Any) -> types.Type | None:
     if isinstance(a, Matrix) and isinstance(c, Matrix) and a.n == c.r:
         return Matrix(a.r, c.n, max(a.w, c.w))
     if max(a.w, c.w) != min(a.w, c.w):
@@ -126,7 +126,7 @@ class _Entry(AbstractTemplate):
     key = "static_getitem"
 
     def generic(self, args: Any, kws: Any) -> Any:
-        v, i = args
+        v, _ = args
         if isinstance(v, Matrix):
             return signature(v.row, *args)
         return signature(element(v.w), *args) if isinstance(v, Vector) else None
@@ -144,10 +144,10 @@ for _kind in (Vector, Matrix):
 class _MatrixAttributes(AttributeTemplate):
     key = Matrix
 
-    def resolve_T(self, a: Any) -> Any:  # noqa: N802 (Numba looks for this name)
+    def resolve_T(self, a: Any) -> Any:
         return Matrix(a.n, a.r, a.w)
 
 
-@lower_getattr(Matrix, "T")
+@lower_getattr(Matrix, "T")  # type: ignore[untyped-decorator]
 def _lower_transpose(context: Any, builder: Any, ty: Any, value: Any) -> Any:
     return transpose(builder, ty, value)

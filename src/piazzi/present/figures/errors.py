@@ -8,10 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from piazzi.estimate import Estimate
-from piazzi.evaluate.compare import Comparison
+from piazzi.evaluate.comparison import Comparison
 from piazzi.evaluate.metrics import errors, groups
 from piazzi.evaluate.quantities import Display, display_of, unit_of
-from piazzi.present.figures.style import MEASURED, colour_of, drawn, label_of, line_of, plain, plain_ticks, symmetric_scale, time_axis
+from piazzi.present.figures.style import (
+    MEASURED,
+    colour_of,
+    drawn,
+    label_of,
+    line_of,
+    plain,
+    plain_ticks,
+    symmetric_scale,
+    time_axis,
+)
 from piazzi.problem.checks import Array
 
 if TYPE_CHECKING:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from piazzi.estimate import Estimate
-from piazzi.evaluate.compare import Comparison
+from piazzi.evaluate.comparison import Comparison
 from piazzi.evaluate.metrics import errors, groups
+from piazzi.io.atomic import atomic_path
 from piazzi.present.figures.errors import claim_overlay, error_overlay, size_of, state_display, state_error
-from piazzi.present.figures.measurements import innovations, measurements
-from piazzi.present.figures.orbit import orbit, position_at, position_columns
-from piazzi.present.figures.style import RC, label_of, plain, symmetric_scale
+from piazzi.present.figures.measured import innovations, measurements
+from piazzi.present.figures.space import orbit, position_at, position_columns
+from piazzi.present.figures.style import MEASURED, RC, label_of, plain, symmetric_scale
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,13 +62,8 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     kind = target.suffix[1:].lower()
     if kind not in FORMATS:
         raise ValueError(f"{target}: a picture ends in {', '.join('.' + f for f in FORMATS)}, not {target.suffix!r}")
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with rc_context(RC):
-            figure.savefig(temporary, format=kind, dpi=150, metadata=_METADATA[kind])
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with rc_context(RC), atomic_path(target) as work:
+        figure.savefig(work, format=kind, dpi=150, metadata=_METADATA[kind])
     return target
 
 
@@ -125,8 +121,9 @@ def error_page(comparison: Comparison) -> Figure:
             state_error(axes[r, c], estimate, state, name=name, show=show).label_outer()
         symmetric_scale(axes[r, 0], [size_of(e, state) * show.factor for _, e in estimates])
     for ax, (name, estimate) in zip(axes[0], estimates, strict=True):
-        ax.set_title(f"{label_of(name, estimate.view)}: error within +-3 sigma")
+        ax.set_title(label_of(name, estimate.view))
     figure.align_ylabels(list(axes[:, 0]))
+    _legend(figure, {"error": {"lw": 1.3, "color": MEASURED}, "+-3 sigma": {"lw": 8, "color": MEASURED, "alpha": 0.25}})
     return figure
 
 
@@ -147,3 +144,12 @@ def overlay_page(comparison: Comparison) -> Figure:
     figure.align_ylabels(list(axes[:, 0]))
     figure.legend(*axes[0, -1].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
+
+
+def _legend(figure: Figure, lines: Mapping[str, Mapping[str, Any]]) -> None:
+    """A legend of line styles alone, below everything."""
+    from matplotlib.lines import Line2D
+
+    figure.legend(
+        [Line2D([], [], **style) for style in lines.values()], list(lines), loc="outside lower center", ncols=len(lines)
+    )

@@ -29,7 +29,7 @@ MEASURED = "#555555"
 PLANET = "#C9D3DC"
 STATIONS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MOST_POINTS = 4000
-RC: dict[str, Any] = {
+RC: Any = {
     "font.size": 9.0,
     "axes.titlesize": 10.0,
     "axes.spines.top": False,
@@ -110,7 +110,7 @@ def _logarithmic(ax: Axes, threshold: float, largest: float) -> None:
     from matplotlib.ticker import NullLocator
 
     ax.set_yscale("symlog", linthresh=threshold)
-    powers = np.arange(np.floor(np.log10(threshold)), np.ceil(np.log10(largest)) + 1)
+    powers = np.arange(np.ceil(np.log10(threshold / 2.5)), np.ceil(np.log10(largest)) + 1)
     marks = 10.0 ** powers[:: -(-len(powers) // 4)]
     ax.set_yticks([*-marks[::-1], 0.0, *marks])
     ax.yaxis.set_minor_locator(NullLocator())

@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from piazzi.problem import Problem, Tracking
-from piazzi.scenarios import load_scenario
-from piazzi.simulate import simulate
+from piazzi.scenarios import load_scenario, names
+from piazzi.simulation import simulate
 
 
-def load(source: str | os.PathLike[str], *, seed: int = 0, scenario: str | None = None) -> tuple[Problem, Tracking]:
+def load(
+    source: str | os.PathLike[str], *, seed: int = 0, scenario: str | os.PathLike[str] | None = None
+) -> tuple[Problem, Tracking]:
     """Problem and tracking of a recording, or of a scenario simulated with `seed`.
 
     Parameters
@@ -32,9 +34,23 @@ def load(source: str | os.PathLike[str], *, seed: int = 0, scenario: str | None 
         For an unknown scenario or a file with something wrong in it: what, the value, and where.
     """
     text = os.fspath(source)
-    if Path(text).suffix.lower() == ".npz":
+    kind = Path(text).suffix.lower()
+    if scenario is not None and kind != ".csv":
+        raise ValueError(f"{text}: only a .csv file is loaded with a scenario; this one holds its own problem")
+    if kind == ".npz":
         from piazzi.io.npz import read_npz
 
         return read_npz(text)
+    if kind == ".nc":
+        from piazzi.io.netcdf import read_netcdf
+
+        return read_netcdf(text)
+    if kind == ".csv":
+        from piazzi.io.csv import read_csv
+
+        if scenario is None:
+            raise ValueError(f"{text}: name the scenario that this .csv file measures: {', '.join(names())}, or a path")
+        problem = load_scenario(scenario).problem
+        return problem, read_csv(text, problem)
     found = load_scenario(text)
     return found.problem, simulate(found.problem, found.times, np.random.default_rng(seed))

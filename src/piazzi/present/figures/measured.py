@@ -36,7 +36,14 @@ def measurements(ax: Axes, problem: Problem, tracking: Tracking, column: int = 0
         rows = np.flatnonzero((index == s) & ~np.isnan(values))
         rows = rows[drawn(len(rows))]
         colour = MEASURED if len(problem.stations) == 1 else STATIONS[s % len(STATIONS)]
-        ax.plot(tracking.row_times[rows] * time.factor, values[rows] * show.factor, ".", ms=2.5, color=colour, label=plain(station.name))
+        ax.plot(
+            tracking.row_times[rows] * time.factor,
+            values[rows] * show.factor,
+            ".",
+            ms=2.5,
+            color=colour,
+            label=plain(station.name),
+        )
     if show.unit == "deg" and np.nanmax(np.abs(values), initial=0.0) > np.pi / 2:
         ax.set_yticks(np.arange(-180, 181, 90))
     ax.set_ylabel(show.label(plain(name)))

@@ -53,7 +53,9 @@ def orbit(
     extent = _extent(reference, planet_radius) * show.factor
     drawn_ellipses = _ellipses(estimate, (i, j), show, ellipses, largest=float(np.max(extent[1] - extent[0])))
     for n, patch in enumerate(drawn_ellipses):
-        patch.set(facecolor=(*_rgb(name), 0.13), edgecolor=_rgb(name), lw=0.9, zorder=2.5, label="3-sigma ellipse" if not n else None)
+        patch.set(
+            facecolor=(*_rgb(name), 0.13), edgecolor=_rgb(name), lw=0.9, zorder=2.5, label="3-sigma ellipse" if not n else None
+        )
         ax.add_patch(patch)
     _frame(ax, extent, drawn_ellipses)
     return _labelled(ax, estimate.problem, (i, j), show)
@@ -107,7 +109,9 @@ def _unit_name(problem: Problem) -> str:
 
 
 def _unit(problem: Problem, path: Array) -> Display:
-    return display_of(_unit_name(problem), [float(v) for v in np.abs(path[np.isfinite(path)]).max(initial=0.0, keepdims=True).ravel()])
+    return display_of(
+        _unit_name(problem), [float(v) for v in np.abs(path[np.isfinite(path)]).max(initial=0.0, keepdims=True).ravel()]
+    )
 
 
 def _rgb(name: str) -> tuple[float, float, float]:
@@ -142,7 +146,9 @@ def _ellipse(mean: Array, P: Array, show: Display) -> Ellipse:
 
     values, vectors = np.linalg.eigh(P)
     axes = 2 * SIGMAS * np.sqrt(np.maximum(values, 0.0)) * show.factor
-    return Ellipse(tuple(mean * show.factor), axes[1], axes[0], angle=float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))))
+    return Ellipse(
+        tuple(mean * show.factor), axes[1], axes[0], angle=float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
+    )
 
 
 def _frame(ax: Axes, extent: Array, patches: list[Ellipse]) -> None:

@@ -47,9 +47,23 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
     states, z = np.empty((K, n)), np.empty((K * len(index), M))
     library = kernels.load(actual.spec("transition", actual.noise_fragment, "simulate"))
     library.run_simulation(
-        K, epochs, start, count, scale, first_row, row_station, actual.station_sensor, actual.station_numbers, actual.given,
-        actual.process_noise.covariance, first, w, np.empty((n, n)), states, z,
-    )  # fmt: skip
+        K,
+        epochs,
+        start,
+        count,
+        scale,
+        first_row,
+        row_station,
+        actual.station_sensor,
+        actual.station_numbers,
+        actual.given,
+        actual.process_noise.covariance,
+        first,
+        w,
+        np.empty((n, n)),
+        states,
+        z,
+    )
     if not np.isfinite(states).all():
         k = int(np.argmin(np.isfinite(states).all(axis=1)))
         raise ValueError(f"the simulated truth is not finite from epoch {k} (t = {epochs[k]:g} s); it started at {first}")

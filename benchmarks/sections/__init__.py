@@ -1,0 +1,11 @@
+"""Sections by name, in the order in which they run; each module has ``figures()``, and imports what it needs when it runs."""
+
+SECTIONS = {
+    "ekf": "extended Kalman filter beside the C floor",
+    "graph": "full factor graph beside the C floor",
+    "window": "sliding windows beside the C floor",
+    "solve": "one linear solve, and one optimisation, beside GTSAM",
+    "filterpy": "extended Kalman filter beside filterpy",
+    "start_up": "whole processes: warm, cold, help, import",
+    "length": "time per epoch and memory against the number of epochs",
+}

@@ -1,0 +1,40 @@
+"""The extended Kalman filter through ``estimate``, measurements new at every call."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterator
+from typing import Any
+
+from cases import Case, calls, floor, variants
+from figures import Figure, interleaved
+
+import piazzi as pz
+
+REPEATS = 40
+BOUND = 2.0
+
+
+def figures() -> Iterator[Figure]:
+    yield from _beside("Taylor, 15 substeps", "ekf", variants(REPEATS + 1))
+    yield from _beside("RK4, 10 substeps", "ekf_rk4", variants(REPEATS + 1, integrator=pz.RungeKutta4(10)))
+
+
+def _beside(what: str, workload: str, cases: list[Case]) -> Iterator[Figure]:
+    estimator = pz.ExtendedKalmanFilter()
+    estimates: list[Any] = []
+
+    def run(case: Case) -> None:
+        estimates.append(estimator.estimate(*case))
+
+    def c() -> float:
+        return floor().seconds(workload, 3)
+
+    seconds, ratio = interleaved([lambda case=case: run(case) for case in cases], c)
+    note = "problem and tracking new at every call"
+    yield Figure(f"EKF, {what}", seconds * 1e3, "ms", ratio=ratio, to="C floor", bound=BOUND, note=note)
+    again, ratio = interleaved(calls(estimator, [(cases[0][0], pz.Tracking(t.row_times, t.values)) for _, t in cases]), c)
+    yield Figure("  tracking alone new at every call", again * 1e3, "ms", ratio=ratio, to="C floor")
+    kernel = statistics.median(e.seconds for e in estimates[1:])
+    note = "wall clock, as in Estimate.seconds"
+    yield Figure("  of it the compiled run", kernel * 1e3, "ms", ratio=kernel / c(), to="C floor", note=note)

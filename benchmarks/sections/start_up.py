@@ -1,0 +1,48 @@
+"""CPU seconds of whole processes, as a user starts them."""
+
+from __future__ import annotations
+
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from cases import recording
+from figures import Figure, UnavailableError
+
+REPEATS = 5
+
+
+def figures() -> Iterator[Figure]:
+    python = sys.executable
+    bare = _cpu([python, "-c", "pass"])
+    yield Figure("Python itself", bare, "s CPU")
+    imported = _cpu([python, "-c", "import piazzi"])
+    yield Figure("import piazzi", imported - bare, "s CPU", bound=0.15, note="over Python itself")
+    program = Path(python).parent / "piazzi"
+    if not program.exists():
+        raise UnavailableError(f"no command {program}: install the package (make bench does)")
+    estimate = [str(program), "estimate", str(recording()), "--json"]
+    yield Figure("piazzi --help", _cpu([str(program), "--help"]), "s CPU", bound=0.3)
+    with tempfile.TemporaryDirectory(prefix="piazzi-bench-") as empty:
+        once = {"PIAZZI_CACHE": empty}
+        yield Figure("piazzi estimate, cold", _cpu(estimate, once, repeats=1), "s CPU", bound=20.0, note="nothing compiled yet")
+        yield Figure("piazzi estimate, warm", _cpu(estimate, once), "s CPU", bound=1.5)
+
+
+def _cpu(command: list[str], environment: Mapping[str, str] | None = None, repeats: int = REPEATS) -> float:
+    """Median CPU seconds, user and system, of the process and its children; raises where it fails."""
+    return statistics.median(_cpu_once(command, environment or {}) for _ in range(repeats))
+
+
+def _cpu_once(command: list[str], environment: Mapping[str, str]) -> float:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | environment)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode:
+        raise UnavailableError(f"{' '.join(command[:2])} ended with {done.returncode}: {done.stderr.strip().splitlines()[-1:]}")
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

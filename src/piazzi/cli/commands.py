@@ -1,0 +1,52 @@
+"""The ``piazzi`` command, which finds the others, each in the file of its name, when they are called."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from importlib import import_module
+
+import click
+
+from piazzi import __version__
+from piazzi.cli.options import Group
+
+COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare")
+
+
+class Commands(Group):
+    """A group whose commands are imported when somebody asks for them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f"piazzi.cli.{cmd_name}").command
+        return command
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and not args[0].startswith("-") and args[0] not in COMMANDS:
+            close = get_close_matches(args[0], COMMANDS, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(COMMANDS)}"
+            ctx.fail(f"unknown command {args[0]!r}; {hint}")
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, "-V", "--version", message="%(prog)s %(version)s")
+def piazzi() -> None:
+    """Orbits from tracking data: several estimators side by side, and which of them to trust.
+
+    SOURCE is a recording (.npz, .nc, or .csv with --scenario), the name of a built-in scenario, a scenario file (.toml),
+    or - for standard input.
+
+    Examples
+    --------
+      piazzi demo -o demo                       a first look: tables and pictures
+      piazzi estimate tracking.npz              the orbit, and how sure it is
+      piazzi compare b612-range --with ekf --with graph
+      piazzi scenarios list                     what is built in
+
+    Exit status: 0 done, 2 bad usage or input, 3 an estimator did not succeed.
+    """

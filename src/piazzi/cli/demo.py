@@ -1,0 +1,131 @@
+"""``piazzi demo``: both founding problems simulated, estimated and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from piazzi.cli import options, output
+from piazzi.cli.compare import DEFAULT
+from piazzi.cli.running import DONE, NOT_ESTIMATED
+
+if TYPE_CHECKING:
+    from piazzi.evaluate import Comparison
+    from piazzi.scenarios import Scenario
+
+PROBLEMS = ("satellite-bearing", "b612-range")
+PICTURES = 4
+KINDS = ("png", "pdf", "svg")
+
+
+@click.command(cls=options.Command)
+@click.option("-o", "--output", "folder", metavar="DIR", default="demo", show_default=True, help="Folder to write into.")
+@click.option("--format", "kind", type=click.Choice(KINDS), default=KINDS[0], show_default=True, help="Of the pictures.")
+@options.seed
+def command(folder: str, kind: str, seed: int) -> int:
+    """Simulate, estimate and draw two problems.
+
+    satellite-bearing is a satellite seen only by its bearing; b612-range a probe around a tiny planet seen only by its range.
+
+    Examples
+    --------
+      piazzi demo
+      piazzi demo -o figures --format pdf --seed 3
+    """
+    target = Path(folder)
+    for name in PROBLEMS:
+        _make_folder(target / name)
+    from piazzi.scenarios import load_scenario
+
+    wrote: list[Path] = []
+    success = True
+    for name in PROBLEMS:
+        scenario = load_scenario(name)
+        with output.progress(len(DEFAULT) + PICTURES) as step:
+            comparison = _estimated(scenario, seed, step)
+            wrote += _drawn(comparison, scenario, target / name, kind, step)
+        wrote += _kept(comparison, target / name)
+        success &= comparison.success
+        _print(comparison, scenario)
+    _conclude(wrote, target)
+    return DONE if success else NOT_ESTIMATED
+
+
+def _make_folder(folder: Path) -> None:
+    """Make the folder, or say that it cannot be, before anything is computed."""
+    from piazzi.io.atomic import check_writable
+
+    folder.mkdir(parents=True, exist_ok=True)
+    check_writable(folder / "comparison.json")
+
+
+def _estimated(scenario: Scenario, seed: int, step: Callable[[str], None]) -> Comparison:
+    import numpy as np
+
+    from piazzi.estimate.registry import parse
+    from piazzi.evaluate import compare
+    from piazzi.simulation import simulate
+
+    tracking = simulate(scenario.problem, scenario.times, np.random.default_rng(seed))
+    estimators = {name: parse(name) for name in DEFAULT}
+
+    def announce(name: str) -> None:
+        step(f"{scenario.name}: {name}")
+
+    return compare(scenario.problem, tracking, estimators, source=scenario.name, announce=announce)
+
+
+def _drawn(comparison: Comparison, scenario: Scenario, folder: Path, kind: str, step: Callable[[str], None]) -> list[Path]:
+    from piazzi.present.figures.pages import pages, save
+
+    out = []
+    for name, figure in pages(comparison, title=scenario.title, planet_radius=scenario.picture.planet_radius):
+        step(f"{scenario.name}: picture of {name}")
+        out.append(save(figure, folder / f"{name}.{kind}"))
+    return out
+
+
+def _kept(comparison: Comparison, folder: Path) -> list[Path]:
+    """Write the rows and the measurements; returns the paths."""
+    from piazzi.io import save
+
+    out = [folder / "comparison.json", folder / "tracking.csv"]
+    output.write_json(str(out[0]), comparison.to_dict())
+    save(out[1], comparison.problem, comparison.tracking)
+    return out
+
+
+def _print(comparison: Comparison, scenario: Scenario) -> None:
+    from rich.text import Text
+
+    from piazzi.present.tables import summary
+
+    head = Text(scenario.title, style="bold")
+    output.print_rich(head, summary(comparison.problem, comparison.tracking, scenario.name), "", comparison, "")
+
+
+def _conclude(wrote: list[Path], folder: Path) -> None:
+    """Say what was written, and what to type next."""
+    lines = [f"Wrote {len(wrote)} files in {folder}:"]
+    for name in PROBLEMS:
+        lines.append(f"  {folder / name}: " + ", ".join(path.name for path in wrote if path.parent == folder / name))
+    kept = folder / PROBLEMS[1] / "tracking.csv"
+    lines += [
+        "",
+        "Next:",
+        *_two_columns(
+            ("piazzi compare b612-range-q0", "the same probe, by filters that trust its dynamics entirely"),
+            (f"piazzi estimate {kept} --scenario {PROBLEMS[1]}", "the last state in numbers"),
+            ("piazzi scenarios show b612-range > mine.toml", "a problem of your own: edit, then piazzi compare mine.toml"),
+            ("piazzi --help", "everything else"),
+        ),
+    ]
+    output.print_text("\n".join(lines))
+
+
+def _two_columns(*pairs: tuple[str, str]) -> list[str]:
+    width = max(len(left) for left, _ in pairs)
+    return [f"  {left:{width}}  {right}" for left, right in pairs]

@@ -1,0 +1,109 @@
+"""``piazzi estimate``: the orbit in a recording, and how sure it is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from piazzi.cli import options, output
+from piazzi.cli.running import DONE, NOT_ESTIMATED
+
+if TYPE_CHECKING:
+    from piazzi.estimate import Estimate
+    from piazzi.evaluate import Comparison
+
+SCHEMA = "piazzi.estimate/1"
+DEFAULT = "ekf"
+ENDINGS = (".json", ".csv", ".npz", ".nc")
+
+
+@click.command(cls=options.WithEstimators)
+@options.source
+@options.estimators(DEFAULT)
+@options.output("Write the estimate: every mean and covariance, as .json, .csv, .npz or .nc; - is JSON on stdout.")
+@options.as_json
+@options.seed
+@options.scenario
+def command(
+    source: str, names: tuple[str, ...], output_file: str | None, as_json: bool, seed: int, scenario: str | None
+) -> int:
+    """Estimate the states in SOURCE.
+
+    Prints the last state with its standard deviations, and errors and consistency over the run.
+
+    Examples
+    --------
+      piazzi estimate tracking.npz
+      piazzi estimate tracking.npz --with window:100 -o orbit.nc
+      piazzi estimate rows.csv --scenario b612-range --json
+      piazzi simulate b612-range -o - | piazzi estimate - --scenario b612-range
+    """
+    output.check_output(output_file, ENDINGS)
+    estimators = options.parsed(names, (DEFAULT,))
+    if output_file is not None and len(estimators) > 1:
+        raise click.UsageError("-o writes one estimate: give one --with, or use compare", click.get_current_context())
+    from piazzi.cli.comparing import run_comparison
+
+    source_name, comparison = run_comparison(source, estimators, seed, scenario)
+    document = to_dict(comparison)
+    if output_file is not None:
+        write(output_file, comparison, document)
+    if as_json:
+        if output_file != output.STDOUT:
+            output.print_json(document)
+    elif output_file != output.STDOUT:
+        _print(comparison, source_name, output_file)
+    return DONE if comparison.success else NOT_ESTIMATED
+
+
+def to_dict(comparison: Comparison) -> dict[str, Any]:
+    """The comparison's object with units, and in every row the last state with its standard deviations."""
+    from piazzi.evaluate.comparison import finite
+
+    model, views = comparison.problem.model, comparison.views
+    document = comparison.to_dict() | {"schema": SCHEMA, "units": {name: model.unit(name) for name in model.names}}
+    for row in document["rows"]:
+        estimate = views.get((row["estimator"], row["view"]))
+        if estimate is not None:
+            variances = estimate.covariance[-1].diagonal().tolist()
+            row["final"] = {
+                "time": float(estimate.times[-1]),
+                "mean": [finite(v) for v in estimate.mean[-1].tolist()],
+                "sigma": [finite(v**0.5) if v >= 0 else None for v in variances],
+            }
+    return document
+
+
+def write(path: str, comparison: Comparison, document: dict[str, Any]) -> None:
+    """Write the one estimate of a comparison in the format of the file's ending."""
+    if not comparison.estimates:
+        return
+    estimate = next(iter(comparison.estimates.values()))
+    if path == output.STDOUT or path.lower().endswith(".json"):
+        output.write_json(path, document | {"series": series(estimate)})
+    else:
+        from piazzi.io import save_estimate
+
+        save_estimate(path, estimate)
+
+
+def series(estimate: Estimate) -> dict[str, Any]:
+    """Every time, mean and covariance as lists, numbers that are not finite as None."""
+    from piazzi.evaluate.comparison import finite
+
+    out: dict[str, Any] = {"view": estimate.view, "times": estimate.times.tolist()}
+    out["mean"] = [[finite(v) for v in row] for row in estimate.mean.tolist()]
+    out["covariance"] = [[[finite(v) for v in row] for row in matrix] for matrix in estimate.covariance.tolist()]
+    if estimate.delayed is not None:
+        out["delayed"] = series(estimate.delayed)
+    return out
+
+
+def _print(comparison: Comparison, source_name: str, output_file: str | None) -> None:
+    from piazzi.present.tables import state_table, summary
+
+    parts: list[Any] = [summary(comparison.problem, comparison.tracking, source_name), ""]
+    for name, estimate in comparison.estimates.items():  # at the last epoch both views of a window are one
+        parts += [state_table(name, estimate), ""]
+    output.print_rich(*parts, comparison, *([f"Wrote {output_file}"] if output_file and comparison.estimates else []))

@@ -1,0 +1,94 @@
+"""``piazzi simulate``: a truth and measurements of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from piazzi.cli import options, output
+from piazzi.cli.running import DONE
+
+if TYPE_CHECKING:
+    from piazzi.problem import Problem, Tracking
+
+SCHEMA = "piazzi.simulate/1"
+ENDINGS = (".nc", ".csv", ".npz")
+
+
+@click.command(cls=options.Command)
+@options.source
+@options.output("Write problem and tracking as .nc, the tracking as .csv, or the founding layout as .npz; - is CSV on stdout.")
+@options.as_json
+@options.seed
+@options.scenario
+def command(source: str, output_file: str | None, as_json: bool, seed: int, scenario: str | None) -> int:
+    """Draw a true path and measurements of it.
+
+    A scenario says what is true and when it is measured.  A recording is simulated anew: its problem, at its times.
+
+    Examples
+    --------
+      piazzi simulate b612-range --seed 3 -o tracking.nc
+      piazzi simulate my-scenario.toml -o rows.csv
+      piazzi simulate b612-range -o - | piazzi estimate - --scenario b612-range
+    """
+    output.check_output(output_file, ENDINGS)
+    if as_json and output_file == output.STDOUT:
+        raise click.UsageError("--json and -o - both want stdout", click.get_current_context())
+    from piazzi.cli.sources import load_source
+
+    found = load_source(source, seed, scenario)
+    problem, tracking = found.problem, found.tracking
+    if found.recorded:
+        import numpy as np
+
+        from piazzi.simulation import simulate
+
+        tracking = simulate(problem, tracking.times, np.random.default_rng(seed))
+    if output_file is not None:
+        write(output_file, problem, tracking)
+    if as_json:
+        output.print_json(to_dict(problem, tracking, found.name, seed, output_file))
+    elif output_file != output.STDOUT:
+        _print(problem, tracking, found.name, seed, output_file)
+    return DONE
+
+
+def to_dict(problem: Problem, tracking: Tracking, name: str, seed: int, output_file: str | None) -> dict[str, Any]:
+    """What was simulated, in numbers; the tracking itself is in the file."""
+    assert tracking.truth is not None
+    return {
+        "schema": SCHEMA,
+        "source": name,
+        "seed": seed,
+        "epochs": len(tracking.times),
+        "measurements": len(tracking.row_times),
+        "states": list(problem.model.names),
+        "units": {n: problem.model.unit(n) for n in problem.model.names},
+        "first": {"time": float(tracking.times[0]), "truth": tracking.truth[0].tolist()},
+        "final": {"time": float(tracking.times[-1]), "truth": tracking.truth[-1].tolist()},
+        "output": output_file,
+    }
+
+
+def write(path: str, problem: Problem, tracking: Tracking) -> None:
+    """Write problem and tracking in the format of the file's ending, CSV for stdout."""
+    from piazzi.io import save
+
+    if path != output.STDOUT:
+        save(path, problem, tracking)
+        return
+    import tempfile
+    from pathlib import Path
+
+    with tempfile.TemporaryDirectory(prefix="piazzi-") as folder:
+        save(Path(folder) / "tracking.csv", problem, tracking)
+        output.print_text((Path(folder) / "tracking.csv").read_text(encoding="utf-8"))
+
+
+def _print(problem: Problem, tracking: Tracking, name: str, seed: int, output_file: str | None) -> None:
+    from piazzi.present.tables import summary, truth_table
+
+    after = f"Wrote {output_file}" if output_file else "Nothing was written: -o tracking.nc keeps it."
+    output.print_rich(f"{summary(problem, tracking, name)}, seed {seed}", "", truth_table(problem, tracking), "", after)

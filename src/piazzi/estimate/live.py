@@ -1,0 +1,196 @@
+"""A filter fed one measurement at a time: the numbers of the whole-run kernel, a few microseconds a call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.estimate.inputs import scratch
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+
+
+class Clock:
+    """Where a session stands between epochs: checks that time goes forward, and the length of each step."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.time = problem.prior_time
+        self._steps: dict[float, tuple[int, float]] = {}
+
+    def interval(self, t: float) -> float:
+        """Seconds from the last epoch to `t`; raises ValueError where that is not a time after it."""
+        if not np.isfinite(t):
+            raise ValueError(f"time is {t}; it must be finite")
+        dt = 0.0 if self.time is None else t - self.time
+        if dt < 0:
+            raise ValueError(f"time {t:g} s is before {self.time:g} s, where the estimate stands")
+        return dt
+
+    def step(self, dt: float) -> tuple[int, float]:
+        """Substeps and noise scale of an interval; intervals that recur are remembered."""
+        found = self._steps.get(dt)
+        if found is None:
+            assert self.problem.integrator is not None
+            interval = np.array([dt])
+            found = int(self.problem.integrator.counts(interval)[0]), float(self.problem.process_noise.scale(interval)[0])
+            if len(self._steps) < 1000:
+                self._steps[dt] = found
+        return found
+
+
+def checked_measurement(problem: Problem, stations: Mapping[str, int], station: str, z: Any, row: Array) -> int:
+    """Write a measurement into `row`, NaN where a component is missing; the station's index.
+
+    Raises
+    ------
+    ValueError
+        For an unknown station, a wrong number of components, or an infinite value.
+    """
+    s = stations.get(station)
+    s = problem.station_index(station) if s is None else s
+    values = (z,) if isinstance(z, (int, float)) else tuple(np.asarray(z, dtype=float).reshape(-1))
+    if len(values) != len(problem.stations[s].noise):
+        raise ValueError(
+            f"station {station!r} measured {z!r}; it must be {len(problem.stations[s].noise)} numbers, NaN where missing"
+        )
+    row.fill(np.nan)
+    for i, value in enumerate(values):
+        if value in (np.inf, -np.inf):
+            raise ValueError(f"station {station!r} measured {z!r}; write NaN for a missing value")
+        row[i] = value
+    return s
+
+
+class LiveFilter:
+    """An extended Kalman filter in progress, from ``ExtendedKalmanFilter().start(problem)``.
+
+    ``predict(t)`` moves to a time, ``update(station, z)`` takes a measurement there; several updates at one time are one epoch,
+    linearised at the prediction.  The same numbers as ``estimate`` on the whole run.
+
+    Attributes
+    ----------
+    time : float or None
+        Seconds; None before the first call of a problem without `prior_time`.
+    mean, covariance : (n,), (n, n)
+        The current belief: predicted, or updated.  The arrays are reused: copy what you keep.
+    innovation, innovation_covariance : (m,), (m, m), of the last update
+    """
+
+    def __init__(self, problem: Problem, fragments: tuple[str, ...]) -> None:
+        self.problem = problem
+        self._clock = Clock(problem)
+        self._stations = {s.name: i for i, s in enumerate(problem.stations)}
+        n, m = problem.model.n, problem.model.width
+        self._base_mean, self._base_covariance = problem.mean.copy(), problem.covariance.copy()
+        self.mean, self.covariance = problem.mean.copy(), problem.covariance.copy()
+        self._x_pred, self._P_pred = problem.mean.copy(), problem.covariance.copy()
+        self._d, self._P = np.zeros(n), problem.covariance.copy()
+        self.innovation, self.innovation_covariance = np.full(m, np.nan), np.full((m, m), np.nan)
+        self._times, self._count, self._which = np.zeros(4), np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+        self._row, self._predicted_to, self._measured = np.full(m, np.nan), problem.prior_time, False
+        library = kernels.load(problem.spec("transition", problem.noise_fragment, *fragments, "filter_live"))
+        self._predict = library.live_predict.bind(
+            self._times,
+            self._count,
+            problem.given,
+            problem.process_noise.covariance,
+            self._base_mean,
+            self._base_covariance,
+            self._x_pred,
+            self._P_pred,
+        )
+        self._update = library.live_update.bind(
+            self._times,
+            self._which,
+            self._row,
+            problem.station_sensor,
+            problem.station_numbers,
+            problem.station_noise,
+            problem.station_correlated,
+            problem.given,
+            *scratch(problem),
+            self._x_pred,
+            self._P_pred,
+            self._d,
+            self._P,
+            self.mean,
+            self.covariance,
+            self.innovation,
+            self.innovation_covariance,
+        )
+
+    @property
+    def time(self) -> float | None:
+        return self._predicted_to
+
+    def predict(self, t: float) -> None:
+        """Carry the belief to time `t`, from the last epoch that had a measurement; raises ValueError where `t` is earlier."""
+        if self._measured and t == self._predicted_to:
+            return
+        if self._measured:
+            self._base_mean[:], self._base_covariance[:] = self.mean, self.covariance
+            self._clock.time, self._measured = self._predicted_to, False
+        dt = self._clock.interval(t)
+        self._times[0], self._times[1], self._times[3] = t if self._clock.time is None else self._clock.time, dt, t
+        if dt > 0:
+            self._count[0], self._times[2] = self._clock.step(dt)
+            self._predict()
+        else:
+            self._x_pred[:], self._P_pred[:] = self._base_mean, self._base_covariance
+        self._predicted_to = t
+        self.mean[:] = self._x_pred
+        np.add(self._P_pred, self._P_pred.T, out=self.covariance)
+        self.covariance *= 0.5
+        self._d.fill(0.0)
+        self._P[:] = self._P_pred
+
+    def update(self, station: str, z: Any, t: float | None = None) -> None:
+        """Take in a measurement of a station, at `t` or where the last prediction stands; NaN where a component is missing.
+
+        Raises
+        ------
+        ValueError
+            For an unknown station, a wrong number of components, an infinite value, or a time that has passed.
+        """
+        s = checked_measurement(self.problem, self._stations, station, z, self._row)
+        if t is not None:
+            self.predict(t)
+        elif self._predicted_to is None:
+            raise ValueError(
+                "the time of the first measurement is not known: call predict(t) first, or give the problem a prior_time"
+            )
+        self._which[0] = s
+        self._update()
+        self._measured = True
+
+    def checkpoint(self) -> dict[str, Array]:
+        """Everything that the next call depends on, as arrays; `restore` takes it back."""
+        stand = [np.nan if v is None else v for v in (self._clock.time, self._predicted_to)]
+        return {name: getattr(self, "_" + name).copy() for name in _KEPT} | {
+            "mean": self.mean.copy(),
+            "covariance": self.covariance.copy(),
+            "clock": np.array([*stand, float(self._measured)]),
+        }
+
+    def restore(self, saved: Mapping[str, Array]) -> None:
+        """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
+        for name in (*_KEPT, "mean", "covariance", "clock"):
+            if name not in saved:
+                raise ValueError(f"the checkpoint has no {name!r}")
+        for name in (*_KEPT, "mean", "covariance"):
+            target = getattr(self, name if name in ("mean", "covariance") else "_" + name)
+            if np.shape(saved[name]) != target.shape:
+                raise ValueError(
+                    f"the checkpoint's {name!r} has shape {np.shape(saved[name])}; this problem needs {target.shape}"
+                )
+            target[...] = saved[name]
+        base, stands, measured = np.asarray(saved["clock"], dtype=float)
+        self._clock.time = None if np.isnan(base) else float(base)
+        self._predicted_to, self._measured = None if np.isnan(stands) else float(stands), bool(measured)
+
+
+_KEPT = ("base_mean", "base_covariance", "x_pred", "P_pred", "d", "P", "times")

@@ -1,0 +1,332 @@
+"""A sliding window fed one measurement at a time, late ones included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.estimate.chain import chain_fragments
+from piazzi.estimate.live import Clock, checked_measurement
+from piazzi.kernels.spec import machine_lanes
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+
+
+class LiveWindow:
+    """A sliding window in progress, from ``SlidingWindow(...).start(problem)``.
+
+    ``update(station, z, t)`` takes a measurement: of a new time, of the newest epoch, or late but inside the window, where it
+    is taken in its place.  One that is older than the window is refused: `update` returns False and `refused` keeps its time and
+    station.  In order, the numbers are those of ``estimate`` on the whole run.
+
+    Attributes
+    ----------
+    time : float or None, the newest epoch, s
+    mean, covariance : (n,), (n, n), the newest state as known now; after `predict`, carried to its time
+    times, means : (W,), (W, n), the states in the window
+    refused : list of (time, station)
+    innovation, innovation_covariance : of the last row taken in
+    """
+
+    def __init__(self, problem: Problem, lag: int, lag_seconds: float | None, iterations: int) -> None:
+        self.problem, self.lag, self.lag_seconds, self.iterations = problem, lag, lag_seconds, iterations
+        self._clock = Clock(problem)
+        self._stations = {s.name: i for i, s in enumerate(problem.stations)}
+        fragments = chain_fragments(problem, "window_step", "window_live", "predict")
+        self._library = kernels.load(problem.spec(*fragments, lanes=machine_lanes()))
+        n, m = problem.model.n, problem.model.width
+        self.mean, self.covariance = problem.mean.copy(), problem.covariance.copy()
+        self.refused: list[tuple[float, str]] = []
+        self._m, self._P = problem.mean.copy(), problem.covariance.copy()
+        self._newest = problem.mean.copy(), problem.covariance.copy()
+        self._row = np.full(m, np.nan)
+        self._nu, self._S = np.empty((0, m)), np.empty((0, m, m))
+        self._t, self._count, self._scale = np.empty(0), np.empty(0, dtype=np.int64), np.empty(0)
+        self._first_row, self._z, self._station = np.zeros(1, dtype=np.int64), np.empty((0, m)), np.empty(0, dtype=np.int64)
+        self._x, self._x_before, self._late_covariance = np.empty((0, n)), np.empty((0, n)), np.empty((0, n, n))
+        self._space: tuple[Array, ...] = ()
+        self._capacity = (0, 0)
+
+    @property
+    def time(self) -> float | None:
+        return float(self._t[-1]) if len(self._t) else self.problem.prior_time
+
+    @property
+    def times(self) -> Array:
+        return self._t.copy()
+
+    @property
+    def means(self) -> Array:
+        return self._x.copy()
+
+    @property
+    def innovation(self) -> Array:
+        nu: Array = self._nu[-1].copy()
+        return nu
+
+    @property
+    def innovation_covariance(self) -> Array:
+        S: Array = self._S[-1].copy()
+        return S
+
+    # ---- measurements --------------------------------------------------------------------------------------------
+
+    def predict(self, t: float) -> None:
+        """Carry the newest state's belief to time `t` for reading; the window itself moves at the next update."""
+        now = self.time
+        dt = 0.0 if now is None else t - now
+        if not dt >= 0:
+            raise ValueError(f"time {t:g} s is before {now:g} s, where the estimate stands")
+        self.mean, self.covariance = (a.copy() for a in self._newest)
+        self._pending = t
+        if dt > 0:
+            count, scale = self._clock.step(dt)
+            p, n = self.problem, self.problem.model.n
+            self._library.predict_once(
+                now,
+                dt,
+                count,
+                scale,
+                p.given,
+                p.process_noise.covariance,
+                self.mean,
+                self.covariance,
+                np.empty((n, n)),
+                np.empty((n, n)),
+            )
+
+    def update(self, station: str, z: Any, t: float | None = None) -> bool:
+        """Take in a measurement, at `t` or where the last prediction stands; whether it was inside the window.
+
+        Raises
+        ------
+        ValueError
+            For an unknown station, a wrong number of components, an infinite value, or a time that is not finite.
+        """
+        s = checked_measurement(self.problem, self._stations, station, z, self._row)
+        t = self._pending if t is None else t
+        if t is None or not np.isfinite(t):
+            raise ValueError(f"time is {t}; it must be finite: give update a time, or call predict first")
+        if not len(self._t):
+            self._begin(t)
+        elif t > self._t[-1]:
+            self._append(t)
+        elif t < self._t[0]:
+            self.refused.append((t, station))
+            return False
+        elif t == self._t[-1]:
+            self._x[:] = self._x_before
+        else:
+            self._insert(t)
+        self._add_row(int(np.searchsorted(self._t, t)), s)
+        self._settle()
+        return True
+
+    _pending: float | None = None
+
+    def _begin(self, t: float) -> None:
+        """First epoch: the prior, carried there."""
+        dt = self._clock.interval(t)
+        if dt > 0:
+            n, p, (count, scale) = self.problem.model.n, self.problem, self._clock.step(dt)
+            self._library.predict_once(
+                t - dt,
+                dt,
+                count,
+                scale,
+                p.given,
+                p.process_noise.covariance,
+                self._m,
+                self._P,
+                np.empty((n, n)),
+                np.empty((n, n)),
+            )
+        self._t, self._count, self._scale = np.array([t]), np.ones(1, dtype=np.int64), np.zeros(1)
+        self._first_row = np.zeros(2, dtype=np.int64)
+        self._x = self._m[None].copy()
+        self._x_before, self._late_covariance = self._x.copy(), self._P[None].copy()
+
+    def _append(self, t: float) -> None:
+        """A new newest state, predicted; states beyond the lag leave."""
+        count, scale = self._clock.step(t - float(self._t[-1]))
+        self._t = np.append(self._t, t)
+        self._count, self._scale = np.append(self._count, count), np.append(self._scale, scale)
+        self._first_row = np.append(self._first_row, self._first_row[-1])
+        self._x = np.vstack([self._x, np.empty((1, self._x.shape[1]))])
+        self._library.live_append(len(self._t) - 1, self._t, self._count, self.problem.given, self._x)
+        leaving = self._leaving()
+        for a in range(leaving):
+            p = self.problem
+            self._library.live_retire(
+                a,
+                0,
+                self._t,
+                self._count,
+                self._scale,
+                self._first_row,
+                p.given,
+                p.process_noise.covariance,
+                self._x,
+                self._nu_lin,
+                self._H_lin,
+                self._dx,
+                self._m,
+                self._P,
+            )
+        self._drop(leaving)
+        self._x_before = self._x.copy()
+
+    def _leaving(self) -> int:
+        if self.lag_seconds is None:
+            return max(len(self._t) - self.lag, 0)
+        return int(np.searchsorted(self._t, self._t[-1] - self.lag_seconds * (1 + 1e-12)))
+
+    def _drop(self, count: int) -> None:
+        rows = int(self._first_row[count])
+        self._t, self._count, self._scale, self._x = (
+            self._t[count:].copy(),
+            self._count[count:],
+            self._scale[count:],
+            self._x[count:].copy(),
+        )
+        self._count, self._scale = self._count.copy(), self._scale.copy()
+        self._first_row = self._first_row[count:] - rows
+        self._z, self._station = self._z[rows:].copy(), self._station[rows:].copy()
+
+    def _insert(self, t: float) -> None:
+        """A late epoch between two others: its state is predicted from the one before."""
+        if t in self._t:
+            return
+        k = int(np.searchsorted(self._t, t))
+        first, second = self._clock.step(t - float(self._t[k - 1])), self._clock.step(float(self._t[k]) - t)
+        self._t = np.insert(self._t, k, t)
+        self._count, self._scale = np.insert(self._count, k, first[0]), np.insert(self._scale, k, first[1])
+        self._count[k + 1], self._scale[k + 1] = second
+        self._first_row = np.insert(self._first_row, k, self._first_row[k])
+        self._x = np.insert(self._x, k, 0.0, axis=0)
+        self._library.live_append(k, self._t, self._count, self.problem.given, self._x)
+        self._x_before = np.insert(self._x_before, k, self._x[k], axis=0)
+
+    def _add_row(self, k: int, s: int) -> None:
+        at = int(self._first_row[k + 1])
+        self._z = np.insert(self._z, at, self._row, axis=0)
+        self._station = np.insert(self._station, at, s)
+        self._first_row[k + 1 :] += 1
+
+    # ---- the window ----------------------------------------------------------------------------------------------
+
+    def _settle(self, all_covariances: bool = False) -> None:
+        p, W = self.problem, len(self._t)
+        space = self._buffers()
+        self._x = np.ascontiguousarray(self._x)
+        self._library.live_settle(
+            0,
+            W - 1,
+            self.iterations,
+            self._t,
+            self._count,
+            self._scale,
+            self._first_row,
+            self._z,
+            self._station,
+            p.station_sensor,
+            p.station_numbers,
+            p.station_noise,
+            p.station_correlated,
+            p.given,
+            p.process_noise.covariance,
+            self._m,
+            self._P,
+            *space,
+            self._x,
+            self._late_covariance,
+            self.covariance,
+            self._nu,
+            self._S,
+            int(all_covariances),
+        )
+        self.mean = self._x[-1].copy()
+        self._newest = self.mean.copy(), self.covariance.copy()
+
+    def _buffers(self) -> tuple[Array, ...]:
+        """Work space of at least the window's size; it keeps the last linearisation for when the oldest state leaves."""
+        W, J, n, m = len(self._t), len(self._z), self.problem.model.n, self.problem.model.width
+        if self._capacity[0] < W or self._capacity[1] < J:
+            big, rows = 2 * W, 2 * J
+            self._capacity = (big, rows)
+            self._nu_lin, self._H_lin, self._dx = np.empty(rows * m), np.empty((rows * m, n)), np.empty((big, n))
+            Q_all = np.empty((big if self.problem.process_noise.is_integral else 1, n, n))
+            self._space = (
+                np.empty((big, n)),
+                np.empty((big, n, n)),
+                Q_all,
+                self._nu_lin,
+                self._H_lin,
+                np.empty((big, n)),
+                np.empty((big, n, n)),
+                np.empty((rows * m + n, n + 1)),
+                np.empty((big, n)),
+                self._dx,
+                np.empty(m),
+                np.empty((m, n)),
+                np.empty(m * (m + n)),
+                np.empty((n, n)),
+                np.empty((n, n)),
+            )
+            self._late_covariance = np.empty((big, n, n))
+        self._nu, self._S = np.empty((J, m)), np.empty((J, m, m))
+        return self._space
+
+    def checkpoint(self) -> dict[str, Array]:
+        """Everything that the next call depends on, as arrays; `restore` takes it back."""
+        out = {name: np.array(getattr(self, "_" + name)) for name in _KEPT}
+        W, J, m = len(self._t), len(self._z), self.problem.model.width
+        if self._capacity[0]:
+            out |= {"nu_lin": self._nu_lin[: J * m].copy(), "H_lin": self._H_lin[: J * m].copy(), "dx": self._dx[:W].copy()}
+        return out | {
+            "mean": self.mean.copy(),
+            "covariance": self.covariance.copy(),
+            "refused": np.array([len(self.refused)], dtype=float),
+        }
+
+    def restore(self, saved: Mapping[str, Array]) -> None:
+        """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
+        n, m = self.problem.model.n, self.problem.model.width
+        for name in (*_KEPT, "mean", "covariance"):
+            if name not in saved:
+                raise ValueError(f"the checkpoint has no {name!r}")
+        W, J = len(saved["t"]), len(saved["z"])
+        shapes = {
+            "m": (n,),
+            "P": (n, n),
+            "t": (W,),
+            "count": (W,),
+            "scale": (W,),
+            "first_row": (W + 1,),
+            "z": (J, m),
+            "station": (J,),
+        }
+        shapes |= {"x": (W, n), "x_before": (W, n), "mean": (n,), "covariance": (n, n)}
+        shapes |= {"nu_lin": (J * m,), "H_lin": (J * m, n), "dx": (W, n)} if W else {}
+        for name, shape in shapes.items():
+            if name not in saved or np.shape(saved[name]) != shape:
+                raise ValueError(f"the checkpoint's {name!r} has shape {np.shape(saved.get(name, ()))}; this problem needs {shape}")
+        for name in _KEPT:
+            kind = np.int64 if name in ("count", "first_row", "station") else float
+            setattr(self, "_" + name, np.array(saved[name], dtype=kind))
+        if J and not (self._station.min() >= 0 and self._station.max() < len(self.problem.stations)):
+            raise ValueError("the checkpoint's 'station' names a station that this problem does not have")
+        steps = np.diff(self._first_row)
+        if self._first_row[0] != 0 or self._first_row[-1] != J or (steps < 0).any() or (W and (np.diff(self._t) <= 0).any()):
+            raise ValueError("the checkpoint's rows and times are not in order")
+        self.mean, self.covariance = np.array(saved["mean"], dtype=float), np.array(saved["covariance"], dtype=float)
+        self._newest = self.mean.copy(), self.covariance.copy()
+        if W:
+            self._buffers()
+            self._nu_lin[: J * m], self._H_lin[: J * m], self._dx[:W] = saved["nu_lin"], saved["H_lin"], saved["dx"]
+
+
+_KEPT = ("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before")

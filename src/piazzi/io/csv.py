@@ -1,0 +1,215 @@
+"""Measurements as comma-separated text: a row for each, with time, station, and the sensors' components by name."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+from collections.abc import Iterable, Sequence
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from piazzi.estimate import Estimate
+from piazzi.io.atomic import atomic_path
+from piazzi.io.cells import STATION, Cells, read_cells
+from piazzi.model import nearest
+from piazzi.problem import Problem, Tracking
+from piazzi.problem.checks import Array
+from piazzi.scenarios.units import Units
+
+TIME = "time"
+TRUTH = "truth:"
+EPOCH = "epoch = "
+_UNIT = re.compile(r"(.*?)\s*\[([^\[\]]*)\]")
+
+
+def read_csv(path: str | os.PathLike[str], problem: Problem) -> Tracking:
+    """The measurements in a file, of a problem's stations.
+
+    The first line names the columns: ``time``, ``station`` (not needed where there is one), the components of the sensors,
+    and, where the truth is known, ``truth:`` and a state.  Empty cells are missing values.  Numbers are in SI and radians,
+    or in the unit that a column names, as in ``bearing [deg]``.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be read.
+    ValueError
+        For columns, stations or cells that do not fit; the message names the file and the line.
+    """
+    try:
+        cells = _in_si(read_cells(path))
+        return _tracking(cells, problem)
+    except ValueError as error:
+        raise ValueError(f"{os.fspath(path)}: {error}") from None
+
+
+def write_csv(path: str | os.PathLike[str], problem: Problem, tracking: Tracking) -> None:
+    """Write measurements, and the truth where there is one, such that `read_csv` gives them back bit for bit.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be written.
+    ValueError
+        Where the tracking does not fit the problem, or a component is called like another column.
+    """
+    station, values = tracking.stations_of(problem), tracking.padded(problem.model.width)
+    header, columns = [TIME], [_written(tracking.row_times)]
+    if tracking.row_stations is not None:
+        header, columns = [*header, STATION], [*columns, np.asarray(tracking.row_stations).tolist()]
+    for name, column in _components(problem, station, values).items():
+        header, columns = [*header, name], [*columns, _written(column)]
+    if tracking.truth is not None:
+        epoch = np.repeat(np.arange(len(tracking.times)), np.diff(tracking.first_row))
+        for i, state in enumerate(problem.model.names):
+            header, columns = [*header, TRUTH + state], [*columns, _written(tracking.truth[epoch, i])]
+    if len(set(header)) < len(header):
+        twice = next(h for h in header if header.count(h) > 1)
+        raise ValueError(f"two columns would be called {twice!r}: rename the component")
+    epoch_line = [EPOCH + " ".join(tracking.epoch.split())] if tracking.epoch else []
+    write_rows(path, header, columns, epoch_line)
+
+
+def write_estimate_csv(path: str | os.PathLike[str], estimate: Estimate) -> None:
+    """Write a row for each epoch: time, means, standard deviations, and the covariances of every pair; raises OSError."""
+    names, P = estimate.names, estimate.covariance
+    header, columns = [TIME, *names], [_written(estimate.times), *(_written(estimate.mean[:, i]) for i in range(len(names)))]
+    for i, name in enumerate(names):
+        header.append(f"sigma_{name}")
+        columns.append(_written(np.sqrt(np.maximum(P[:, i, i], 0.0))))
+    for i, name in enumerate(names):
+        for j in range(i, len(names)):
+            header.append(f"cov_{name}_{names[j]}")
+            columns.append(_written(P[:, i, j]))
+    write_rows(path, header, columns, [f"view = {estimate.view}"])
+
+
+def write_rows(
+    path: str | os.PathLike[str], header: Sequence[str], columns: Sequence[Iterable[Any]], comments: Sequence[str] = ()
+) -> None:
+    """Write columns under their names, whole or not at all; numbers are written such that they read back bit for bit."""
+    with atomic_path(path) as work, open(work, "w", encoding="utf-8", newline="") as file:
+        file.writelines(f"# {line}\n" for line in comments)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        rows = zip(*columns, strict=True)
+        while block := list(islice(rows, 10_000)):
+            writer.writerows(block)
+
+
+def _written(column: Array) -> list[Any]:
+    """Numbers as Python's own, whose text is exact; "" for NaN."""
+    out: list[Any] = column.tolist()
+    for i in np.flatnonzero(np.isnan(column)):
+        out[i] = ""
+    return out
+
+
+def _components(problem: Problem, station: Array, values: Array) -> dict[str, Array]:
+    """Column of every component's name, NaN at rows whose station has no such component."""
+    out: dict[str, Array] = {}
+    for s, place in enumerate(problem.stations):
+        rows = station == s
+        for k, component in enumerate(problem.model.sensor(place.sensor).components):
+            column = out.setdefault(component, np.full(len(values), np.nan))
+            column[rows] = values[rows, k]
+    return out
+
+
+def _in_si(cells: Cells) -> Cells:
+    """The same table with the units of its column names taken into account."""
+    numbers: dict[str, Array] = {}
+    for name, column in cells.numbers.items():
+        match = _UNIT.fullmatch(name)
+        label, factor = (match[1], Units().unit(match[2]).factor) if match else (name, 1.0)
+        if label in numbers:
+            raise ValueError(f"two columns are called {label!r}")
+        with np.errstate(over="ignore"):
+            numbers[label] = column if factor == 1.0 else column * factor
+    return Cells(cells.comments, numbers, cells.station, cells.station_names, cells.lines)
+
+
+def _tracking(cells: Cells, problem: Problem) -> Tracking:
+    if not problem.stations:
+        raise ValueError("the problem has no stations, so nothing can be measured")
+    _check_columns(cells, problem)
+    times = cells.numbers[TIME]
+    if not times.size:
+        raise ValueError("there are no measurements: only a header")
+    _check_times(cells, times)
+    station = _stations(cells, problem)
+    values = _values(cells, problem, station)
+    names: Any = None if cells.station is None else np.array(cells.station_names)[cells.station]
+    first = np.flatnonzero(np.diff(times, prepend=-np.inf) > 0)
+    states = problem.model.names
+    known = TRUTH + states[0] in cells.numbers
+    truth = np.column_stack([cells.numbers[TRUTH + s][first] for s in states]) if known else None
+    epoch = next((c.removeprefix(EPOCH) for c in cells.comments if c.startswith(EPOCH)), "")
+    return Tracking(times, values, names, truth, epoch)
+
+
+def _check_columns(cells: Cells, problem: Problem) -> None:
+    """Refuse columns that mean nothing here, and tables that lack one."""
+    components = {c for s in problem.stations for c in problem.model.sensor(s.sensor).components}
+    truths = [TRUTH + s for s in problem.model.names]
+    valid = [TIME, STATION, *sorted(components), *truths]
+    for name in cells.numbers:
+        if name not in valid:
+            raise ValueError(f"unknown column {name[:60]!r}{nearest(name[:60], valid)}")
+    if TIME not in cells.numbers:
+        raise ValueError(f"there is no column {TIME!r}")
+    if not components & cells.numbers.keys():
+        raise ValueError(f"there is no column of measurements ({', '.join(sorted(components))})")
+    absent = [t for t in truths if t not in cells.numbers]
+    if 0 < len(absent) < len(truths):
+        raise ValueError(f"the truth has no column {absent[0]!r}")
+    if cells.station is None and len(problem.stations) > 1:
+        raise ValueError(f"there is no column {STATION!r}; the problem has {', '.join(s.name for s in problem.stations[:20])}")
+
+
+def _check_times(cells: Cells, times: Array) -> None:
+    bad = np.flatnonzero(~np.isfinite(times))
+    if bad.size:
+        what = "is missing" if np.isnan(times[bad[0]]) else f"is {times[bad[0]]}"
+        raise ValueError(f"line {cells.lines[bad[0]]}: the time {what}; it must be finite")
+    down = np.flatnonzero(np.diff(times) < 0)
+    if down.size:
+        i = int(down[0]) + 1
+        raise ValueError(f"line {cells.lines[i]}: times must increase, but {times[i]:g} s comes after {times[i - 1]:g} s")
+
+
+def _stations(cells: Cells, problem: Problem) -> Array:
+    """Index of every row's station into the problem's."""
+    if cells.station is None:
+        return np.zeros(len(cells.numbers[TIME]), dtype=np.int64)
+    known = [s.name for s in problem.stations]
+    for i, name in enumerate(cells.station_names):
+        if name not in known:
+            line = cells.lines[int(np.argmax(cells.station == i))]
+            raise ValueError(f"line {line}: unknown station {name[:60]!r}{nearest(name[:60], known[:50])}")
+    return np.array([known.index(name) for name in cells.station_names], dtype=np.int64)[cells.station]
+
+
+def _values(cells: Cells, problem: Problem, station: Array) -> Array:
+    """Measurements (J, m) in the order of each sensor's components."""
+    out = np.full((len(station), problem.model.width), np.nan)
+    columns = {name: column for name, column in cells.numbers.items() if name != TIME and not name.startswith(TRUTH)}
+    for s, place in enumerate(problem.stations):
+        rows = slice(None) if len(problem.stations) == 1 else np.flatnonzero(station == s)
+        components = problem.model.sensor(place.sensor).components
+        for name, column in columns.items():
+            if name in components:
+                out[rows, components.index(name)] = column[rows]
+            elif not np.isnan(column[rows]).all():
+                i = int(np.flatnonzero((station == s) & ~np.isnan(column))[0])
+                has = f"station {place.name!r} measures {', '.join(components)}"
+                raise ValueError(f"line {cells.lines[i]}: {name} is {column[i]:g}, but {has}")
+    infinite = np.argwhere(np.isinf(out))
+    if infinite.size:
+        i, k = infinite[0]
+        name = problem.model.sensor(problem.stations[station[i]].sensor).components[k]
+        raise ValueError(f"line {cells.lines[int(i)]}: {name} is {out[i, k]}; leave the cell empty where it is missing")
+    return out

@@ -1,0 +1,143 @@
+"""Arrays and text out of an HDF5 file that may be anything: no links are followed, no objects made, nothing absurd is read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from piazzi.problem.checks import Array
+from piazzi.scenarios.faults import one_line
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+# A data set may hold this much, or this many times its size in the file if that is more
+FREE_BYTES = 64 * 2**20
+EXPANSION = 20
+MAX_TEXT = 2**22
+_DAMAGE = (OSError, KeyError, RuntimeError, TypeError, OverflowError, MemoryError, AttributeError, IndexError, ArithmeticError)
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
+    """The file's root group; whatever is wrong in it comes out as a ValueError that names the file.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be read.
+    """
+    name = os.fspath(path)
+    with open(path, "rb") as file:
+        start = file.read(8)
+    if start != SIGNATURE:
+        what = {b"": "is empty", b"CDF": "is classic NetCDF; NetCDF-4 is needed"}.get(start[:3], "is not a NetCDF-4 file")
+        raise ValueError(f"{name}: the file {what}")
+    import h5py
+
+    try:
+        with h5py.File(path, "r", locking=False) as root:
+            yield root
+    except ValueError as error:
+        raise ValueError(f"{name}: {one_line(str(error))}") from None
+    except _DAMAGE as error:
+        raise ValueError(f"{name}: the file is damaged: {one_line(str(error))}") from None
+
+
+def subgroup(group: Any, name: str) -> Any | None:
+    """The group of that name inside another; None where there is none."""
+    import h5py
+
+    found = _member(group, name)
+    if found is not None and not isinstance(found, h5py.Group):
+        raise ValueError(f"{name!r} is not a group")
+    return found
+
+
+def array(group: Any, name: str, *, required: bool = True) -> Array | None:
+    """The numbers of a variable.
+
+    Raises
+    ------
+    ValueError
+        Where it is missing but required, or holds anything but real numbers, lies outside the file or is absurdly large.
+    """
+    data = _variable(group, name, required)
+    if data is None:
+        return None
+    if data.dtype.kind not in "biuf":
+        raise ValueError(f"variable {name!r} is not made of real numbers: it has type {str(data.dtype)[:40]}")
+    _check_size(data, name, data.dtype.itemsize)
+    return np.asarray(data[()])
+
+
+def texts(group: Any, name: str) -> list[str]:
+    """The texts of a variable."""
+    import h5py
+
+    data = _variable(group, name, True)
+    if h5py.check_string_dtype(data.dtype) is None or data.ndim != 1:
+        raise ValueError(f"variable {name!r} is not a list of text")
+    _check_size(data, name, max(data.dtype.itemsize, 16))
+    return [str(value) for value in data.asstr()[()]]
+
+
+def text(group: Any, name: str, default: str | None = None) -> str:
+    """A text attribute."""
+    value = _attribute(group, name, default)
+    if isinstance(value, bytes):
+        value = value.decode("utf-8")
+    if not isinstance(value, str) or len(value) > MAX_TEXT:
+        raise ValueError(f"attribute {name!r} is not text")
+    return value
+
+
+def number(group: Any, name: str) -> float:
+    """An attribute that is one number."""
+    value = np.asarray(_attribute(group, name, None))
+    if value.size != 1 or value.dtype.kind not in "iuf":
+        raise ValueError(f"attribute {name!r} is not a number")
+    return float(value.reshape(-1)[0])
+
+
+def _attribute(group: Any, name: str, default: str | None) -> Any:
+    if name not in group.attrs:
+        if default is None:
+            raise ValueError(f"there is no attribute {name!r}")
+        return default
+    if group.attrs.get_id(name).get_storage_size() > MAX_TEXT:
+        raise ValueError(f"attribute {name!r} is absurdly large")
+    return group.attrs[name]
+
+
+def _member(group: Any, name: str) -> Any | None:
+    import h5py
+
+    if name not in group:
+        return None
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise ValueError(f"{name!r} is a link, which is not followed")
+    return group[name]
+
+
+def _variable(group: Any, name: str, required: bool) -> Any:
+    import h5py
+
+    data = _member(group, name)
+    if data is None:
+        if required:
+            raise ValueError(f"there is no variable {name!r}")
+        return None
+    if not isinstance(data, h5py.Dataset) or data.shape is None:
+        raise ValueError(f"{name!r} is not a variable with values")
+    if data.external or data.is_virtual:
+        raise ValueError(f"variable {name!r} has its values in another file, which is not read")
+    return data
+
+
+def _check_size(data: Any, name: str, itemsize: int) -> None:
+    size, limit = int(data.size) * itemsize, max(FREE_BYTES, EXPANSION * data.id.get_storage_size())
+    if size > limit:
+        raise ValueError(f"variable {name!r} would take {size:,} bytes, absurd for what the file holds (limit {limit:,})")
