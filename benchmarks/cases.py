@@ -64,13 +64,13 @@ def long_runs(epochs: int, count: int = 1) -> list[Case]:
     return [(problem, pz.simulate(problem, np.arange(epochs) * dt, np.random.default_rng(seed))) for seed in range(count)]
 
 
-def solved() -> tuple[Any, Any]:
-    """A chain of states linearised and solved at the solution of the full graph, and its solver."""
+def solved(case: Case | None = None) -> tuple[Any, Any]:
+    """A chain of states linearised and solved at the solution of the full graph (default: the recording's), and its solver."""
     from piazzi.estimate.chain import Chain, CovarianceSolver
     from piazzi.estimate.factor_graph import FactorGraph
     from piazzi.estimate.inputs import prepare
 
-    problem, tracking = pz.load(recording())
+    problem, tracking = case or pz.load(recording())
     chain = Chain(problem, prepare(problem, tracking))
     chain.x[:] = FactorGraph().estimate(problem, tracking).mean
     chain.linearize()

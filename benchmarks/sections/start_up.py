@@ -23,11 +23,10 @@ def figures() -> Iterator[Figure]:
     yield Figure("Python itself", bare, "s CPU")
     imported = _cpu([python, "-c", "import piazzi"])
     yield Figure("import piazzi", imported - bare, "s CPU", bound=0.15, note="over Python itself")
-    program = Path(python).parent / "piazzi"
-    if not program.exists():
-        raise UnavailableError(f"no command {program}: install the package (make bench does)")
-    estimate = [str(program), "estimate", str(recording()), "--json"]
-    yield Figure("piazzi --help", _cpu([str(program), "--help"]), "s CPU", bound=0.3)
+    script = Path(python).parent / "piazzi"
+    program = [str(script)] if script.exists() else [python, "-m", "piazzi"]
+    estimate = [*program, "estimate", str(recording()), "--json"]
+    yield Figure("piazzi --help", _cpu([*program, "--help"]), "s CPU", bound=0.3)
     with tempfile.TemporaryDirectory(prefix="piazzi-bench-") as empty:
         once = {"PIAZZI_CACHE": empty}
         yield Figure("piazzi estimate, cold", _cpu(estimate, once, repeats=1), "s CPU", bound=20.0, note="nothing compiled yet")
@@ -44,5 +43,5 @@ def _cpu_once(command: list[str], environment: Mapping[str, str]) -> float:
     done = subprocess.run(command, capture_output=True, text=True, env=os.environ | environment)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode:
-        raise UnavailableError(f"{' '.join(command[:2])} ended with {done.returncode}: {done.stderr.strip().splitlines()[-1:]}")
+        raise UnavailableError(f"{' '.join(command)} ended with {done.returncode}: {done.stderr.strip().splitlines()[-1:]}")
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

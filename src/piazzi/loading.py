@@ -11,6 +11,8 @@ from piazzi.problem import Problem, Tracking
 from piazzi.scenarios import load_scenario, names
 from piazzi.simulation import simulate
 
+KINDS = (".npz", ".nc", ".csv", ".toml")
+
 
 def load(
     source: str | os.PathLike[str], *, seed: int = 0, scenario: str | os.PathLike[str] | None = None
@@ -52,5 +54,7 @@ def load(
             raise ValueError(f"{text}: name the scenario that this .csv file measures: {', '.join(names())}, or a path")
         problem = load_scenario(scenario).problem
         return problem, read_csv(text, problem)
+    if kind != ".toml" and os.path.isfile(text):
+        raise ValueError(f"{text}: files end in {', '.join(KINDS)}, not {kind!r}")
     found = load_scenario(text)
     return found.problem, simulate(found.problem, found.times, np.random.default_rng(seed))

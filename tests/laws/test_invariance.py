@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from tests.laws.problems import assert_same_estimate, network, satellite, sigma
 SEEDS = st.integers(0, 2**32 - 1)
 UPDATES = st.sampled_from(["joint", "components"])
 TURN = 2 * np.pi
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def observed(seed, epochs=6, stations=None):
@@ -148,7 +150,7 @@ print(digest.hexdigest())
 
 def test_same_seed_same_bytes():
     """In one process and in another; a different seed gives different ones."""
-    printed = {subprocess.run([sys.executable, "-c", SAME_BYTES], check=True, capture_output=True, text=True).stdout for _ in range(2)}
+    printed = {subprocess.run([sys.executable, "-c", SAME_BYTES], check=True, capture_output=True, text=True, cwd=ROOT).stdout for _ in range(2)}
     assert len(printed) == 1
     problem = satellite()
     a, b, c = (pz.simulate(problem, np.arange(50) * 15.0, np.random.default_rng(seed)) for seed in (7, 7, 8))

@@ -35,8 +35,9 @@ BAD_NAMES = ["", "1x", "x y", "x-y", "_x", "x__y", "__class__", "lambda", "sin",
 def test_names_that_cannot_stand_in_an_equation_are_refused(name):
     refused("state .* cannot be used as a name", states=[name, "y"])
     refused("parameter .* cannot be used as a name", parameters=[name])
-    with pytest.raises(ValueError, match="sensor .* cannot be used as a name|has no equations"):
-        pz.Sensor(name, ["x"])
+    if name != "x-y":  # a sensor is never part of an equation, and may have a hyphen
+        with pytest.raises(ValueError, match="sensor .* cannot be used as a name"):
+            pz.Sensor(name, ["x"])
 
 
 def test_greek_names_are_names():
@@ -151,11 +152,8 @@ def test_models_are_values():
 
 
 def test_a_model_of_text_needs_no_sympy():
-    code = "import sys, tests.model.test_model as t; t.model(); print('sympy' in sys.modules)".replace("tests.model.test_model as t; t.model()", SOURCE)
+    code = "import sys, piazzi as pz; pz.Model(['x'], ['-k*x'], [pz.Sensor('s', ['x**2'])], ['k']); print('sympy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout == "False\n"
-
-
-SOURCE = "piazzi as pz; pz.Model(['x'], ['-k*x'], [pz.Sensor('s', ['x**2'])], ['k'])"
 
 
 # ---- parameters and sensors ------------------------------------------------------------------------------------------
@@ -230,4 +228,5 @@ def test_jacobian_of_magnitudes_is_real():
     h = sp.Float("1e-8", 40)
     for i, v in enumerate((x, y)):
         moved = [derive(m).f.evalf(40, subs={**at, v: at[v] + s * h}) for s in (1, -1)]
-        assert F[:, i].evalf(30, subs=at) == pytest.approx((moved[0] - moved[1]) / (2 * h), rel=1e-9)
+        numeric = [float(v) for v in (moved[0] - moved[1]) / (2 * h)]
+        assert [float(v) for v in F[:, i].evalf(30, subs=at)] == pytest.approx(numeric, rel=1e-9)

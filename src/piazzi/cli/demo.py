@@ -113,19 +113,12 @@ def _conclude(wrote: list[Path], folder: Path) -> None:
     for name in PROBLEMS:
         lines.append(f"  {folder / name}: " + ", ".join(path.name for path in wrote if path.parent == folder / name))
     kept = folder / PROBLEMS[1] / "tracking.csv"
-    lines += [
-        "",
-        "Next:",
-        *_two_columns(
-            ("piazzi compare b612-range-q0", "the same probe, by filters that trust its dynamics entirely"),
-            (f"piazzi estimate {kept} --scenario {PROBLEMS[1]}", "the last state in numbers"),
-            ("piazzi scenarios show b612-range > mine.toml", "a problem of your own: edit, then piazzi compare mine.toml"),
-            ("piazzi --help", "everything else"),
-        ),
-    ]
+    lines += ["", "Next:"]
+    for typed, why in (
+        ("piazzi compare b612-range-q0", "the same probe, by filters that trust its dynamics entirely"),
+        (f"piazzi estimate {kept} --scenario {PROBLEMS[1]}", "the last state in numbers"),
+        ("piazzi scenarios show b612-range > mine.toml", "a problem of your own: edit it, then piazzi compare mine.toml"),
+        ("piazzi --help", "everything else"),
+    ):
+        lines += [f"  {typed}", f"      {why}"]
     output.print_text("\n".join(lines))
-
-
-def _two_columns(*pairs: tuple[str, str]) -> list[str]:
-    width = max(len(left) for left, _ in pairs)
-    return [f"  {left:{width}}  {right}" for left, right in pairs]

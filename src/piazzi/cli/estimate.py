@@ -25,8 +25,17 @@ ENDINGS = (".json", ".csv", ".npz", ".nc")
 @options.as_json
 @options.seed
 @options.scenario
+@click.option("--follow", metavar="FILE", help="Read measurements as lines of CSV from FILE, - for stdin, as they come.")
+@click.option("--checkpoint", metavar="FILE", help="With --follow: where to keep the state, and to go on from.")
 def command(
-    source: str, names: tuple[str, ...], output_file: str | None, as_json: bool, seed: int, scenario: str | None
+    source: str,
+    names: tuple[str, ...],
+    output_file: str | None,
+    as_json: bool,
+    seed: int,
+    scenario: str | None,
+    follow: str | None,
+    checkpoint: str | None,
 ) -> int:
     """Estimate the states in SOURCE.
 
@@ -38,7 +47,12 @@ def command(
       piazzi estimate tracking.npz --with window:100 -o orbit.nc
       piazzi estimate rows.csv --scenario b612-range --json
       piazzi simulate b612-range -o - | piazzi estimate - --scenario b612-range
+      sensor | piazzi estimate b612-range --follow - --with window:50 --checkpoint state.npz
     """
+    if follow is not None:
+        return _follow(source, options.parsed(names, (DEFAULT,)), output_file, as_json, follow, checkpoint)
+    if checkpoint is not None:
+        raise click.UsageError("--checkpoint goes with --follow", click.get_current_context())
     output.check_output(output_file, ENDINGS)
     estimators = options.parsed(names, (DEFAULT,))
     if output_file is not None and len(estimators) > 1:
@@ -55,6 +69,19 @@ def command(
     elif output_file != output.STDOUT:
         _print(comparison, source_name, output_file)
     return DONE if comparison.success else NOT_ESTIMATED
+
+
+def _follow(
+    source: str, estimators: dict[str, Any], output_file: str | None, as_json: bool, stream: str, checkpoint: str | None
+) -> int:
+    """Follow a stream of measurements of the problem in SOURCE."""
+    from piazzi.cli.follow import follow
+    from piazzi.cli.sources import load_problem
+
+    if len(estimators) > 1:
+        raise click.UsageError("--follow runs one estimator: give one --with", click.get_current_context())
+    output.check_output(output_file, (".jsonl",) if as_json else (".csv",))
+    return follow(load_problem(source), next(iter(estimators.values())), stream, output_file, checkpoint, as_json)
 
 
 def to_dict(comparison: Comparison) -> dict[str, Any]:

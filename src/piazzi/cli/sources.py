@@ -50,6 +50,17 @@ def load_source(source: str, seed: int, scenario: str | None = None) -> Source:
     return Source(problem, tracking, STDIN, path.suffix in RECORDINGS)
 
 
+def load_problem(source: str) -> Problem:
+    """The problem of a scenario, without simulating it, or of a recording; raises as `load_source` does."""
+    from piazzi import load
+    from piazzi.io.files import RECORDINGS
+    from piazzi.scenarios import load_scenario
+
+    if source.lower().endswith(RECORDINGS):
+        return load(source)[0]
+    return load_scenario(source).problem
+
+
 def _spooled(scenario: str | None) -> Path:
     """Standard input as a temporary file whose ending says what its first bytes are."""
     if sys.stdin is None or sys.stdin.isatty():

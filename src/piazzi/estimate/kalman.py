@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -88,7 +89,17 @@ def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tup
         nu,
         S,
     )
-    return mean, P, nu, S, time.perf_counter() - started
+    seconds = time.perf_counter() - started
+    if not isfinite(mean[0].sum()) and inputs.t_prior == inputs.t[0]:
+        raise ValueError(_singular_start(problem, inputs))
+    return mean, P, nu, S, seconds
+
+
+def _singular_start(problem: Problem, inputs: Inputs) -> str:
+    """Why the very first update failed: the prior itself is finite."""
+    names = sorted({problem.stations[s].name for s in inputs.station[: inputs.first_row[1]]})
+    at = ", ".join(f"{name} = {value:g}" for name, value in zip(problem.model.names, problem.mean, strict=True))
+    return f"station {', '.join(map(repr, names))} has no derivative at the prior mean ({at})"
 
 
 @dataclass(frozen=True, eq=False)

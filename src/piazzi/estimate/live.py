@@ -80,6 +80,8 @@ class LiveFilter:
     innovation, innovation_covariance : (m,), (m, m), of the last update
     """
 
+    saved_names = ("base_mean", "base_covariance", "x_pred", "P_pred", "d", "P", "times", "mean", "covariance", "clock")
+
     def __init__(self, problem: Problem, fragments: tuple[str, ...]) -> None:
         self.problem = problem
         self._clock = Clock(problem)

@@ -31,6 +31,11 @@ class LiveWindow:
     innovation, innovation_covariance : of the last row taken in
     """
 
+    saved_names = (
+        *("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before"),
+        *("nu_lin", "H_lin", "dx", "mean", "covariance"),
+    )
+
     def __init__(self, problem: Problem, lag: int, lag_seconds: float | None, iterations: int) -> None:
         self.problem, self.lag, self.lag_seconds, self.iterations = problem, lag, lag_seconds, iterations
         self._clock = Clock(problem)

@@ -59,7 +59,7 @@ def check(text: str, allowed: Collection[str]) -> frozenset[str]:
 def to_sympy(text: str, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
     """Return the SymPy expression of an equation over `symbols` (see `symbol`).
 
-    Integers and their quotients are exact rationals; a decimal is a Float whose `float` is the double that was written.
+    Integers and their quotients are exact rationals; a decimal is the double that was written, exactly.
     SymPy simplifies as it always does, so 2*(x + y) comes back expanded and x - x as zero.
 
     Raises

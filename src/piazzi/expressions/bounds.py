@@ -26,7 +26,7 @@ LOG10_2 = math.log10(2.0)
 EXACT = frozenset({"abs", "min", "max"})
 FORWARD = frozenset({"sin", "cos", "tan", "sinh", "cosh", "tanh"})
 #: Digits before the decimal point, of functions with values of at most 1 or pi.
-SMALL = dict.fromkeys(("sin", "cos", "tanh", "sign"), 0.0) | dict.fromkeys(("asin", "acos", "atan", "atan2"), math.log10(math.pi))
+SMALL = {"sin": 0.0, "cos": 0.0, "tanh": 0.0, "sign": 0.0, "asin": 0.5, "acos": 0.5, "atan": 0.5, "atan2": 0.5}
 
 Value: TypeAlias = Fraction | float
 

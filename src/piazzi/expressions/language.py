@@ -21,8 +21,6 @@ MAX_NAME = 64
 MAX_DEPTH = 50
 #: Integers stay below 10**308, so that every number of an equation is also a finite double.
 MAX_DIGITS = 308
-#: What a double can need: with SymPy's usual 15, its printers drop the last two.
-FLOAT_DIGITS = 17
 #: SymPy compares the arguments of min and max pair by pair: 20 take seconds.
 MAX_EXTREMES = 20
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from piazzi.expressions.bounds import MAX_EXPONENT
 from piazzi.expressions.errors import ExpressionError
-from piazzi.expressions.language import FLOAT_DIGITS, MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum
+from piazzi.expressions.language import MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum
 from piazzi.expressions.parse import Parsed
 
 if TYPE_CHECKING:
     import sympy as sp
 
-SYMPY_NAMES = {"abs": "Abs", "min": "Min", "max": "Max"}
+SYMPY_NAMES = {"min": "Min", "max": "Max"}
 
 
 @functools.cache
@@ -31,7 +31,7 @@ def build(parsed: Parsed, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
     import sympy as sp
 
     expr = _build(parsed.tree, parsed.text, symbols)
-    if expr.has(sp.I, sp.nan, sp.zoo, sp.oo, -sp.oo):
+    if expr.has(sp.I, sp.nan, sp.zoo, sp.oo, -sp.oo, sp.re, sp.im, sp.arg):
         raise ExpressionError("the equation has no finite real value", parsed.text)
     for number in expr.atoms(sp.Number):
         if not _fits_a_double(number):
@@ -59,7 +59,7 @@ def _build_unchecked(node: Node, text: str, symbols: Mapping[str, sp.Symbol]) ->
         case Number(value=int() as value):
             return sp.Integer(value)
         case Number(value=value):
-            return _double(value)
+            return sp.Float(value)  # 53 bits: the double itself, although SymPy prints 15 digits of it
         case Name(name="pi"):
             return sp.pi
         case Name(name=name):
@@ -75,19 +75,13 @@ def _build_unchecked(node: Node, text: str, symbols: Mapping[str, sp.Symbol]) ->
             return _power(_build(base, text, symbols), _build(exponent, text, symbols), node, text)
         case Call(function="exp", arguments=(argument,)):
             return _exp(_build(argument, text, symbols))
+        case Call(function="abs", arguments=(argument,)):
+            return _abs(_build(argument, text, symbols))
         case Call(function="hypot", arguments=(a, b)):
             return sp.sqrt(_build(a, text, symbols) ** 2 + _build(b, text, symbols) ** 2)
         case Call(function=function, arguments=arguments):
             build_call = getattr(sp, SYMPY_NAMES.get(function, function))  # one of FUNCTIONS: the parser saw to it
             return build_call(*(_build(argument, text, symbols) for argument in arguments))
-
-
-def _double(value: float) -> sp.Float:
-    """Return the double as it was written: 0.1 and not 0.10000000000000001, as long as `float` of it is the same bits."""
-    import sympy as sp
-
-    decimal = sp.Float(repr(value), FLOAT_DIGITS)
-    return decimal if float(decimal) == value else sp.Float(value, FLOAT_DIGITS)
 
 
 def _product(factors: list[tuple[bool, Any, int]], text: str) -> Any:
@@ -123,6 +117,14 @@ def _exp(argument: Any) -> Any:
     if argument.is_Add:
         argument = sp.Add(*(sp.Rational(float(term)) if term.is_Float else term for term in argument.args))
     return sp.exp(argument)
+
+
+def _abs(argument: Any) -> Any:
+    """Return abs of a SymPy argument, as a root where SymPy cannot tell that x**1.5 is real and would take its real part."""
+    import sympy as sp
+
+    magnitude = sp.Abs(argument)
+    return sp.sqrt(argument**2) if magnitude.has(sp.re, sp.im, sp.arg) else magnitude
 
 
 def _is_finite_real(expr: Any, *, grows: bool) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 
 from piazzi.expressions.bounds import read
 from piazzi.expressions.errors import ExpressionError, quote
-from piazzi.expressions.language import FLOAT_DIGITS, FUNCTIONS, MAX_DIGITS, MAX_LENGTH
+from piazzi.expressions.language import FUNCTIONS, MAX_DIGITS, MAX_LENGTH
 from piazzi.expressions.parse import is_name
 
 SUPPORTED = f"an equation has real numbers, symbols, pi, + - * / ** and {', '.join(FUNCTIONS)}"
@@ -162,7 +162,7 @@ def _as_decimal(term: Any) -> Any:
     import sympy as sp
 
     if term.is_Rational and term.q > 1 and sp.Rational(float(term)) == term:
-        return sp.Float(float(term), FLOAT_DIGITS)
+        return sp.Float(float(term))
     return term
 
 

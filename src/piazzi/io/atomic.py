@@ -15,18 +15,19 @@ from pathlib import Path
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary name in the folder of `path`, moved to `path` when the block ends well, and removed when it does not.
 
-    A link is followed; what is no regular file (a pipe, /dev/null) is written to and not replaced.
+    A link is followed; what is no regular file (a pipe, /dev/null) is written to, not replaced.
 
     Raises
     ------
     OSError
         Where nothing can be written there.
     """
-    target = Path(os.path.realpath(path))
-    check_writable(target)
-    special = target.exists() and not target.is_file()
-    folder = None if special else target.parent
-    handle, name = tempfile.mkstemp(prefix=f".{target.stem[:40]}-", suffix=target.suffix, dir=folder)
+    check_writable(path)
+    special = _is_special(path)
+    target = Path(path if special else os.path.realpath(path))
+    handle, name = tempfile.mkstemp(
+        prefix=f".{target.stem[:40]}-", suffix=target.suffix[-40:], dir=None if special else target.parent
+    )
     os.close(handle)
     work = Path(name)
     try:
@@ -43,15 +44,21 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Return nothing if a file can be written at `path`; raise OSError, saying why, if not.  Nothing is changed."""
-    target = Path(os.path.realpath(path))
-    name = os.fspath(path)
-    if target.is_dir():
+    name, target = os.fspath(path), Path(os.path.realpath(path))
+    if _is_special(path):
+        if not os.access(path, os.W_OK):
+            raise PermissionError(f"cannot write {name}: no permission")
+    elif target.is_dir() or not target.name:
         raise IsADirectoryError(f"cannot write {name}: it is a folder")
-    if not target.parent.is_dir():
+    elif not target.parent.is_dir():
         raise FileNotFoundError(f"cannot write {name}: there is no folder {target.parent}")
-    special = target.exists() and not target.is_file()
-    if not os.access(target if special else target.parent, os.W_OK):
-        raise PermissionError(f"cannot write {name}: no permission to write {'to it' if special else f'in {target.parent}'}")
+    elif not os.access(target.parent, os.W_OK | os.X_OK):
+        raise PermissionError(f"cannot write {name}: no permission to write in {target.parent}")
+
+
+def _is_special(path: str | os.PathLike[str]) -> bool:
+    """Whether there is something that is neither a file nor a folder."""
+    return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
 
 
 def _settle(work: Path, target: Path) -> None:

@@ -18,7 +18,7 @@ STATION = "station"
 MAX_BYTES = 2**32
 MAX_COLUMNS = 1000
 _ODD = (b'"', b"\r", b"\0", b"rue", b"RUE", b"alse", b"ALSE")  # true and false are numbers to pandas, but not to us
-_SMALL = 2**19  # bytes for which the careful way takes less time than importing pandas
+SMALL = 2**19  # bytes for which the careful way takes less time than importing pandas
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +65,9 @@ def read_cells(path: str | os.PathLike[str]) -> Cells:
         if first.startswith(b"#"):
             comments.append(_decoded(first[1:], line).strip())
         elif first.strip():
-            header = _header(_decoded(first, line), line)
+            header = parse_header(first, line)
             rest = rest.rstrip(b"\n")
-            return _fast(rest, line + 1, header, tuple(comments)) or _careful(rest, line + 1, header, tuple(comments))
+            return fast(rest, line + 1, header, tuple(comments)) or parse_rows(rest, line + 1, header, tuple(comments))
     raise ValueError("the file is empty: no line names its columns")
 
 
@@ -80,9 +80,10 @@ def _decoded(content: bytes, line: int) -> str:
         raise ValueError(f"line {line}: it is not UTF-8 text: byte 0x{content[error.start]:02x}") from None
 
 
-def _header(first: str, line: int) -> list[str]:
+def parse_header(first: bytes, line: int) -> list[str]:
+    """Names of the columns; raises ValueError for a line that cannot name them."""
     try:
-        header = [cell.strip() for cell in next(csv.reader([first]))]
+        header = [cell.strip() for cell in next(csv.reader([_decoded(first, line)]))]
     except csv.Error as error:
         raise ValueError(f"line {line}: {error}") from None
     if len(header) > MAX_COLUMNS:
@@ -95,9 +96,9 @@ def _header(first: str, line: int) -> list[str]:
     return header
 
 
-def _fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -> Cells | None:
+def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -> Cells | None:
     """The table where every line is one regular row of plain cells, else None."""
-    if len(body) < _SMALL or any(odd in body for odd in _ODD) or not _is_regular(body, len(header)):
+    if len(body) < SMALL or any(odd in body for odd in _ODD) or not _is_regular(body, len(header)):
         return None
     import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 
@@ -138,7 +139,7 @@ def _merged(index: Array, given: list[str]) -> tuple[Array, tuple[str, ...]]:
     return np.array([*(names[name] for name in given), -1], dtype=np.int64)[index], tuple(names)
 
 
-def _careful(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -> Cells:
+def parse_rows(body: bytes, line: int, header: list[str], comments: tuple[str, ...] = ()) -> Cells:
     """The table row by row; raises ValueError at the first cell that does not fit."""
     text = _decoded(body, line)
     columns: dict[str, list[float]] = {name: [] for name in header if name != STATION}

@@ -7,17 +7,19 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.estimate import Estimate
 from piazzi.io.atomic import atomic_path
 from piazzi.io.cells import STATION, Cells, read_cells
 from piazzi.model import nearest
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.scenarios.units import Units
+
+if TYPE_CHECKING:
+    from piazzi.estimate import Estimate
 
 TIME = "time"
 TRUTH = "truth:"
@@ -40,8 +42,7 @@ def read_csv(path: str | os.PathLike[str], problem: Problem) -> Tracking:
         For columns, stations or cells that do not fit; the message names the file and the line.
     """
     try:
-        cells = _in_si(read_cells(path))
-        return _tracking(cells, problem)
+        return cells_to_tracking(read_cells(path), problem)
     except ValueError as error:
         raise ValueError(f"{os.fspath(path)}: {error}") from None
 
@@ -130,6 +131,11 @@ def _in_si(cells: Cells) -> Cells:
         with np.errstate(over="ignore"):
             numbers[label] = column if factor == 1.0 else column * factor
     return Cells(cells.comments, numbers, cells.station, cells.station_names, cells.lines)
+
+
+def cells_to_tracking(cells: Cells, problem: Problem) -> Tracking:
+    """The measurements in a table; raises ValueError for columns, stations or cells that do not fit the problem."""
+    return _tracking(_in_si(cells), problem)
 
 
 def _tracking(cells: Cells, problem: Problem) -> Tracking:

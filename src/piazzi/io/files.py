@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.estimate import Estimate
 from piazzi.model import nearest
 from piazzi.problem import Problem, Tracking
+from piazzi.problem.checks import Array
+
+if TYPE_CHECKING:
+    from piazzi.estimate import Estimate
 
 RECORDINGS = (".nc", ".npz", ".csv")
 
@@ -87,7 +91,7 @@ def load_estimate(path: str | os.PathLike[str]) -> Estimate:
     return read_estimate(path)
 
 
-def _arrays(estimate: Estimate) -> Mapping[str, np.ndarray]:
+def _arrays(estimate: Estimate) -> Mapping[str, Array]:
     out = {
         "times": estimate.times, "names": np.array(estimate.names), "mean": estimate.mean, "covariance": estimate.covariance,
         "innovations": estimate.innovations, "innovation_covariances": estimate.innovation_covariances,

@@ -4,7 +4,8 @@ Sizes: `ND` states, `N` values with the estimated constants, `M` components of t
 
 * ``dynamics(t, x, p)``, ``rhs(t, x, R, p)``: dx/dt, and with it dR/dt = F R for the first `ND` rows of a transition matrix
 * ``substep(t, h, x, p)``, ``substep_jacobian(t, h, x, R, p)``: one step of the integrator; with its derivative times R
-* ``first_rows()``, ``complete(R)``: the rows of the identity to start from; R with the constants' rows below it
+* ``remember(x)``, ``first_rows()``: the state at the start of a step, and its derivative; ``identity_rows()``
+* ``complete(R)``: R with the constants' rows below it
 * ``measure_into(sensor, t, x, p, s, at, out, row)``: h
 * ``innovate(sensor, t, x, p, s, at, z, row, nu, H, out)``: z - h, angles wrapped, and H
 """
@@ -26,7 +27,7 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
     """Source of the sizes, dynamics, step and sensors; `lanes` problems are worked on at once where there are that many."""
     sizes = {
         "LANES": lanes,
-        "ND": len(model.states),
+        "ND": len(model.moving),
         "N": model.n,
         "M": model.width,
         "NUMBERS": max([len(model.numbers(s)) for s in model.sensors] + [1]),
@@ -53,11 +54,18 @@ def _inline(head: str, *lines: str) -> str:
 
 
 def _identity_source(model: Model) -> str:
-    nd, n = len(model.states), model.n
-    top = ", ".join(f"unit({i}, {n})" for i in range(nd))
+    """Where a step starts: memories take the value, and the derivative, of the state that they remember."""
+    nd, n = len(model.moving), model.n
+    rows = [", ".join(f"unit({i}, {n})" for i in source) for source in (range(nd), model.sources)]
     rest = "".join(f", unit({i}, {n})" for i in range(nd, n))
     full = "R" if nd == n else "matrix(" + ", ".join(f"R[{i}]" for i in range(nd)) + rest + ")"
-    return _inline("first_rows()", f"return matrix({top})") + _inline("complete(R)", f"return {full}")
+    start = ", ".join(f"x[{i}]" for i in (*model.sources, *range(nd, n)))
+    return (
+        _inline("identity_rows()", f"return matrix({rows[0]})")
+        + _inline("first_rows()", f"return matrix({rows[1]})")
+        + _inline("remember(x)", f"return vector({start})" if model.memory else "return x")
+        + _inline("complete(R)", f"return {full}")
+    )
 
 
 class _Jacobian:
@@ -91,7 +99,7 @@ class _Jacobian:
 
 def _rows(model: Model) -> list[str]:
     """Text of the rows that a Jacobian multiplies: those of R, then the constants' unit rows."""
-    nd, n = len(model.states), model.n
+    nd, n = len(model.moving), model.n
     return [f"R[{i}]" for i in range(nd)] + [f"unit({i}, {n})" for i in range(nd, n)]
 
 
@@ -101,7 +109,7 @@ def _unpack(names: Sequence[str], call: str) -> str:
 
 def _dynamics_source(model: Model) -> str:
     d, (arguments, names, call) = derive(model), _arguments(model)
-    nd, n = len(model.states), model.n
+    nd, n = len(model.moving), model.n
     F = _Jacobian(d.F, "F")
     rates = [f"f{i}" for i in range(nd)]
     whole = f"vector({', '.join(rates + ['0.0'] * (n - nd))})"
@@ -130,7 +138,7 @@ def _map_source(model: Model, nxt: Sequence[sp.Expr], h: sp.Symbol) -> str:
 
     arguments, names, call = _arguments(model, ("h",))
     names = {**names, h: "h"}
-    nd, n = len(model.states), model.n
+    nd, n = len(model.moving), model.n
     G = _Jacobian(jacobian(sp.Matrix(list(nxt)), derive(model).x), "G")
     results = [f"n{i}" for i in range(nd)]
     whole = f"vector({', '.join(results + [f'x[{i}]' for i in range(nd, n)])})"

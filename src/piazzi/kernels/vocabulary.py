@@ -22,6 +22,8 @@ rhs: Any
 substep: Any
 substep_jacobian: Any
 first_rows: Any
+identity_rows: Any
+remember: Any
 complete: Any
 measure_into: Any
 innovate: Any

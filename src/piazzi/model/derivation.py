@@ -40,7 +40,8 @@ def derive(model: Model) -> Derivation:
 
     symbols = {name: symbol(name) for name in (*model.names, *model.given, TIME, STEP)}
     x = tuple(symbols[name] for name in model.names)
-    f = sp.Matrix([to_sympy(e, symbols) for e in model.dynamics])
+    remembered = [symbols[name] if model.discrete else sp.Integer(0) for name, _ in model.memory]
+    f = sp.Matrix([*(to_sympy(e, symbols) for e in model.dynamics), *remembered])
     return Derivation(x, tuple(symbols[p] for p in model.given), symbols[TIME], symbols[STEP], f, jacobian(f, x))
 
 

@@ -40,6 +40,8 @@ class Model:
         Errors are summed over groups; "position" is what pictures draw.
     units : mapping of state to unit, such as ``{"x": "m"}``
     discrete : bool
+    memory : mapping of name to state, such as ``{"x_before": "x"}``
+        Further values that hold what a state was at the epoch before, for measurements of two neighbouring states.
 
     Raises
     ------
@@ -54,12 +56,15 @@ class Model:
     groups: Any = field(default_factory=dict)
     units: Any = field(default_factory=dict)
     discrete: bool = False
+    memory: Any = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "states", tuple(name_of(s, "state") for s in several(self.states, "states")))
         put(self, "parameters", tuple(_parameter(p) for p in _items(self.parameters)))
         put(self, "sensors", self._sensors())
+        remembered = tuple((name_of(k, "memory"), str(v)) for k, v in dict(self.memory).items())
+        put(self, "memory", remembered)
         put(self, "dynamics", self._equations())
         put(self, "groups", tuple((str(g), tuple(str(s) for s in members)) for g, members in dict(self.groups).items()))
         put(self, "units", tuple((str(s), str(u)) for s, u in dict(self.units).items()))
@@ -96,6 +101,7 @@ class Model:
             raise ValueError("a model needs at least one state")
         taken: dict[str, str] = {TIME: "the time", STEP: "the length of a step"}
         everything = [("state", s) for s in self.states] + [("parameter", p.name) for p in self.parameters]
+        everything += [("memory", name) for name, _ in self.memory]
         for what, name in everything:
             if name in taken:
                 raise ValueError(f"{what} {name!r} is also {taken[name]}: every name has one meaning")
@@ -109,12 +115,15 @@ class Model:
             for member in members:
                 if member not in self.names:
                     raise ValueError(f"group {group!r} names {member!r}, which is not a state{nearest(member, self.names)}")
+        for name, source in self.memory:
+            if source not in self.states:
+                raise ValueError(f"memory {name!r} is of {source!r}, which is not a state{nearest(source, self.states)}")
         for name, _ in self.units:
             if name not in self.names:
                 raise ValueError(f"units names {name!r}, which is not a state{nearest(name, self.names)}")
 
     def _check_equations(self) -> None:
-        allowed = {*self.states, *self.parameter_names, TIME} | ({STEP} if self.discrete else set())
+        allowed = {*self.moving, *self.parameter_names, TIME} | ({STEP} if self.discrete else set())
         for state, equation in zip(self.states, self.dynamics, strict=True):
             for name in sorted(names(equation) - allowed):
                 hint = nearest(name, sorted(allowed))
@@ -139,8 +148,18 @@ class Model:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Everything that is estimated, in order: the states, then the estimated constants."""
-        return self.states + self.constants
+        """Everything that is estimated, in order: the states, memories of them, then the estimated constants."""
+        return self.moving + self.constants
+
+    @cached_property
+    def moving(self) -> tuple[str, ...]:
+        """The states, then the memories of them."""
+        return self.states + tuple(name for name, _ in self.memory)
+
+    @cached_property
+    def sources(self) -> tuple[int, ...]:
+        """For each value of `moving`, the position that it has at the start of a step: a memory takes its state's."""
+        return tuple(range(len(self.states))) + tuple(self.states.index(source) for _, source in self.memory)
 
     @property
     def n(self) -> int:
@@ -170,7 +189,7 @@ class Model:
 
     @cached_property
     def _numbers(self) -> dict[str, tuple[str, ...]]:
-        taken = {*self.states, *self.parameter_names, TIME}
+        taken = {*self.moving, *self.parameter_names, TIME}
         return {sensor.name: tuple(sorted(sensor.free_names - taken)) for sensor in self.sensors}
 
     def unit(self, name: str) -> str:

@@ -48,6 +48,8 @@ def dynamics_jacobian(problem: Problem, x: Any, t: Any) -> Array:
 def step(problem: Problem, x: Any, dt: float, t: Any) -> tuple[Array, Array]:
     """Next states and the derivative of the step."""
     assert problem.integrator is not None
+    if not np.isfinite(dt):
+        raise ValueError(f"dt is {dt} s; it must be finite")
     many, times, one = _states(problem, x, t)
     n, count = problem.model.n, int(problem.integrator.counts(np.array([float(dt)]))[0])
     out, Phi = np.empty((len(many), n)), np.empty((len(many), n, n))

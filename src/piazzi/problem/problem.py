@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.expressions.errors import suggest
 from piazzi.kernels import Discrete, Integrator, KernelSpec, RungeKutta4
 from piazzi.model import Model, nearest
 from piazzi.problem import functions
@@ -104,7 +105,10 @@ class Problem:
                 )
         for name in wanted:
             if name not in station.numbers:
-                raise ValueError(f"station {station.name!r} gives no value for {name!r}, which sensor {station.sensor!r} uses")
+                near = suggest(name, [*station.numbers, *self.model.states, *self.model.parameter_names])
+                raise ValueError(
+                    f"station {station.name!r} gives no value for {name!r}, which sensor {station.sensor!r} uses{near}"
+                )
         return {name: _number(station.numbers[name], f"{name!r} of station {station.name!r}") for name in wanted}
 
     def _parameters(self) -> dict[str, Any]:
@@ -122,8 +126,8 @@ class Problem:
             return _number(given, f"parameter {name!r}")
         if not isinstance(given, Gaussian):
             raise ValueError(f"parameter {name!r} is {role}: give Gaussian(mean, variance), not {given!r}")
-        mean = finite_vector(given.mean, 1, f"parameter {name!r}", [name])
-        return Gaussian(mean, covariance(given.covariance, 1, f"variance of parameter {name!r}", [name]))
+        mean = finite_vector(given.mean, 1, "parameter mean", [name])
+        return Gaussian(mean, covariance(given.covariance, 1, "parameter variance", [name]))
 
     def _integrator(self) -> Integrator:
         if self.integrator is None:
@@ -144,14 +148,15 @@ class Problem:
     @cached_property
     def mean(self) -> Array:
         """Prior mean of everything estimated, (n,)."""
-        return frozen([*self.prior.mean, *(self.parameters[c].mean[0] for c in self.model.constants)])
+        moving = self.prior.mean[list(self.model.sources)]
+        return frozen([*moving, *(self.parameters[c].mean[0] for c in self.model.constants)])
 
     @cached_property
     def covariance(self) -> Array:
         """Prior covariance of everything estimated, (n, n)."""
         out = np.zeros((self.model.n, self.model.n))
-        nd = len(self.model.states)
-        out[:nd, :nd] = self.prior.covariance
+        sources, nd = list(self.model.sources), len(self.model.moving)
+        out[:nd, :nd] = self.prior.covariance[np.ix_(sources, sources)]
         for i, name in enumerate(self.model.constants, start=nd):
             out[i, i] = self.parameters[name].covariance[0, 0]
         return frozen(out)

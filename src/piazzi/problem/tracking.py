@@ -131,6 +131,42 @@ class Tracking:
         self._check_widths(problem, index)
         return index
 
+    def with_factor(self, problem: Problem, station: str, times: Any = None) -> Tracking:
+        """The same tracking with a factor of the user's own: rows in which `station` measures zero.
+
+        The equations of the station's sensor are the residual, its noise is the residual's covariance.  Together with
+        ``Model(memory=...)`` a residual may connect two neighbouring states.
+
+        Parameters
+        ----------
+        problem : Problem
+        station : str
+        times : epochs at which the factor holds; default all but the first
+
+        Raises
+        ------
+        ValueError
+            For an unknown station, or times that are not epochs.
+        """
+        own = problem.stations[problem.station_index(station)]
+        at = self.times[1:] if times is None else numeric(times, "times").reshape(-1)
+        for t in at[~np.isin(at, self.times)]:
+            raise ValueError(f"factor {station!r} is wanted at t = {t:g} s, which is not an epoch")
+        width = max(self.values.shape[1], len(own.noise))
+        zeros = np.full((len(at), width), np.nan)
+        zeros[:, : len(own.noise)] = 0.0
+        names = self.row_stations
+        if names is None:
+            others = [s.name for s in problem.stations if s.name != station]
+            if len(others) != 1:
+                raise ValueError(f"the tracking does not say which station measured; beside {station!r} the problem has {others}")
+            names = np.full(len(self.row_times), others[0])
+        row_times = np.concatenate([self.row_times, at])
+        order = np.argsort(row_times, kind="stable")
+        values = np.concatenate([self.padded(width), zeros])[order]
+        stations = np.concatenate([names, np.full(len(at), station)])[order]
+        return Tracking(row_times[order], values, stations, self.truth, self.epoch)
+
     def _check_widths(self, problem: Problem, index: Array) -> None:
         widths = np.array([len(s.noise) for s in problem.stations])
         columns = self.values.shape[1]

@@ -2,6 +2,7 @@
 
 from piazzi.scenarios.faults import Fault, ScenarioError
 from piazzi.scenarios.loader import check, load_scenario, names, show
+from piazzi.scenarios.options import vary
 from piazzi.scenarios.scenario import Picture, Scenario
 
-__all__ = ["Fault", "Picture", "Scenario", "ScenarioError", "check", "load_scenario", "names", "show"]
+__all__ = ["Fault", "Picture", "Scenario", "ScenarioError", "check", "load_scenario", "names", "show", "vary"]

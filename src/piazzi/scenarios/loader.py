@@ -100,7 +100,7 @@ def _tables(path: Path, faults: Faults) -> dict[str, Any]:
         faults.add(f"line {content.count(bytes([10]), 0, long.start()) + 1}", "has a dotted key of more than 30 parts")
         return {}
     try:
-        return tomllib.loads(content.decode("utf-8"))
+        return tomllib.loads(content.decode("utf-8") + "\n")  # so that the end has a line, too
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         faults.add(f"line {line}", f"is not UTF-8 text: byte 0x{content[error.start]:02x}")

@@ -93,7 +93,9 @@ def read_station(table: Table, physics: Physics) -> Station | None:
     sensor = table.text("sensor", sensors[0] if len(sensors) == 1 else None, sensors)
     if "sensor" not in table and len(sensors) > 1:
         table.fault("sensor", f"is missing: one of {', '.join(sensors)}")
-    if sensor is None:
+    if sensor is not None and not sensors:
+        table.fault("sensor", f"is {shown(sensor)}, but there are no sensors")
+    if sensor not in physics.components:
         table.finish(("noise", "numbers"))
         return None
     components, own = physics.components[sensor], physics.numbers[sensor]

@@ -19,7 +19,9 @@ class Table:
     """One table with its path.  Readers return None (or what is empty) where there is nothing usable, after noting why."""
 
     def __init__(self, data: Mapping[str, Any], path: str, faults: Faults) -> None:
-        self.data, self.path, self.faults = data, path, faults
+        # TOML has no null; where the tables come from JSON, it means that the key is not there
+        self.data = {key: value for key, value in data.items() if value is not None}
+        self.path, self.faults = path, faults
         self._read: set[str] = set()
 
     def __contains__(self, key: str) -> bool:

@@ -7,6 +7,7 @@ from math import floor
 import numpy as np
 
 from piazzi.problem.checks import Array
+from piazzi.scenarios.faults import shown
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import Units
 
@@ -17,7 +18,10 @@ def read_times(table: Table, units: Units) -> Array | None:
     """Epochs in seconds, from start, step and count or stop, or from a list."""
     if "list" in table:
         value = table.raw("list")
-        times = table.vector("list", [f"time {i}" for i in range(len(value))] if isinstance(value, list) else ["time"])
+        if not isinstance(value, list):
+            table.fault("list", f"must be a list of times, not {shown(value)}")
+            return None
+        times = table.vector("list", [f"time {i}" for i in range(len(value))])
         table.finish()
         return None if times is None else _increasing(table, times * units.time())
     start = table.number("start")
@@ -34,7 +38,9 @@ def read_times(table: Table, units: Units) -> Array | None:
         if stop < first:
             table.fault("stop", f"is {stop:g}, before the start at {first:g}")
             return None
-        count = floor(min((stop - first) / step * (1 + 1e-12), 1e300)) + 1
+        # a stop that is a whole number of steps away, up to rounding, is the last epoch
+        slack = min(4e-16 * (abs(first) + abs(stop)) / step, 0.5)
+        count = floor(min((stop - first) / step * (1 + 1e-12) + slack, 1e300)) + 1
     assert count is not None
     if count > MAX_EPOCHS:
         table.fault("", f"makes {count:g} epochs; at most {MAX_EPOCHS:g} are allowed")

@@ -66,7 +66,8 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
     )
     if not np.isfinite(states).all():
         k = int(np.argmin(np.isfinite(states).all(axis=1)))
-        raise ValueError(f"the simulated truth is not finite from epoch {k} (t = {epochs[k]:g} s); it started at {first}")
+        start_text = ", ".join(f"{name} = {value:g}" for name, value in zip(problem.model.names, first, strict=True))
+        raise ValueError(f"the simulated truth is not finite from epoch {k} (t = {epochs[k]:g} s); it started at {start_text}")
     if truth_half.measurement_noise:
         z += np.einsum("jab,jb->ja", np.linalg.cholesky(problem.station_noise)[row_station], v)
     z = _wrapped(problem, row_station, z)
@@ -101,6 +102,8 @@ def _first_state(problem: Problem, actual: Problem, truth: Truth, rng: np.random
     x = actual.mean + vectors @ (np.sqrt(np.maximum(values, 0.0)) * (vectors.T @ draw))
     if truth.state is not None:
         x[:nd] = finite_vector(truth.state, nd, "true state", states)
+    moving = len(problem.model.moving)
+    x[:moving] = x[list(problem.model.sources)]
     return np.ascontiguousarray(x)
 
 

@@ -29,7 +29,7 @@ def linearize_dynamics(a, W, t, count, scale, p, Q, x, f, Phi, Q_all):
             break
         start = load_lanes(t, k, 1, 1, LANES)[0]
         h = (load_lanes(t, k + 1, 1, 1, LANES)[0] - start) / count[k + 1]
-        y, R = substep_jacobian(start, h, load_lanes(x, k * N, N, N, LANES), first_rows(), p)
+        y, R = substep_jacobian(start, h, remember(load_lanes(x, k * N, N, N, LANES)), first_rows(), p)
         for i in range(1, count[k + 1]):
             y, R = substep_jacobian(start + i * h, h, y, R, p)
         store_lanes(f, j * N, N, y)

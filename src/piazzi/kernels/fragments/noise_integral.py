@@ -11,13 +11,14 @@ def advance(t, dt, count, x, p, Q, scale):
     substep and E over its second half, Q' = G (Q' + h/6 Q) G^T + 4h/6 E Q E^T + h/6 Q.
     """
     h = dt / count
-    Phi = identity(N)
+    x = remember(x)
+    Phi = complete(first_rows())
     Q_step = 0.0 * Q
     for i in range(count):
         at = t + i * h
         middle = substep(at, 0.5 * h, x, p)
-        _, second = substep_jacobian(at + 0.5 * h, 0.5 * h, middle, first_rows(), p)
-        x, first = substep_jacobian(at, h, x, first_rows(), p)
+        _, second = substep_jacobian(at + 0.5 * h, 0.5 * h, middle, identity_rows(), p)
+        x, first = substep_jacobian(at, h, x, identity_rows(), p)
         G = complete(first)
         E = complete(second)
         Phi = G @ Phi

@@ -12,7 +12,7 @@ def evaluate_dynamics(K: int, t: Array, x: Array, p: Array, out: Array) -> None:
 @entry
 def evaluate_dynamics_jacobian(K: int, t: Array, x: Array, p: Array, out: Array) -> None:
     for k in range(K):
-        _, F = rhs(t[k], load_vector(x, k * N, N), first_rows(), p)
+        _, F = rhs(t[k], load_vector(x, k * N, N), identity_rows(), p)
         store(out, k * N * N, F)
         for i in range(ND * N, N * N):
             out[k * N * N + i] = 0.0

@@ -12,6 +12,7 @@ def symmetric(P):
 @inline
 def travel(t, dt, count, x, p):
     """The state `dt` seconds later, in `count` substeps."""
+    x = remember(x)
     h = dt / count
     for i in range(count):
         x = substep(t + i * h, h, x, p)
@@ -21,6 +22,7 @@ def travel(t, dt, count, x, p):
 @inline
 def transition(t, dt, count, x, p):
     """The state `dt` seconds later, and its derivative with respect to the state now."""
+    x = remember(x)
     R = first_rows()
     h = dt / count
     for i in range(count):

@@ -123,12 +123,14 @@ def error_page(comparison: Comparison) -> Figure:
     for ax, (name, estimate) in zip(axes[0], estimates, strict=True):
         ax.set_title(label_of(name, estimate.view))
     figure.align_ylabels(list(axes[:, 0]))
+    if any(ax.get_yscale() == "symlog" for ax in axes[:, 0]):
+        figure.supxlabel("Scales are linear about zero and logarithmic further out.", fontsize=8, color=MEASURED)
     _legend(figure, {"error": {"lw": 1.3, "color": MEASURED}, "+-3 sigma": {"lw": 8, "color": MEASURED, "alpha": 0.25}})
     return figure
 
 
 def overlay_page(comparison: Comparison) -> Figure:
-    """Errors of all estimators over each other on the left, what their covariances expect on the right, a row for each group."""
+    """Errors of all estimators on the left, what their covariances expect on the right, a row for each group."""
     first = next(iter(comparison.estimates.values()))
     names, known = list(groups(first)), errors(first) is not None
     figure = _figure(10.5, 2.7 * len(names) + 0.7)

@@ -62,7 +62,7 @@ def orbit(
 
 
 def position_at(ax: Axes, estimates: Mapping[tuple[str, str], Estimate], k: int = -1) -> Axes:
-    """Where each estimator puts the object at epoch `k`, relative to the truth (else to the first of them), with 3-sigma ellipses.
+    """Where each estimator puts the object at epoch `k`, from the truth (else the first of them), with 3-sigma ellipses.
 
     Parameters
     ----------

@@ -106,7 +106,7 @@ def symmetric_scale(ax: Axes, sizes: Sequence[Array]) -> None:
 
 
 def _logarithmic(ax: Axes, threshold: float, largest: float) -> None:
-    """A scale that is linear up to the threshold and logarithmic beyond, with at most four powers of ten marked on each side."""
+    """A scale linear up to the threshold and logarithmic beyond, with at most four powers of ten marked on each side."""
     from matplotlib.ticker import NullLocator
 
     ax.set_yscale("symlog", linthresh=threshold)

@@ -1,0 +1,147 @@
+"""`piazzi estimate SCENARIO --follow`: a tracker in a pipe, that survives bad lines and being killed."""
+
+import json
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+
+PIAZZI = [str(Path(sys.executable).with_name("piazzi"))]
+FOLLOW = [*PIAZZI, "estimate", "b612-range", "--follow"]
+
+
+def run(*arguments, text=""):
+    return subprocess.run([*FOLLOW, *map(str, arguments)], input=text, capture_output=True, text=True, timeout=120)
+
+
+@pytest.fixture(scope="module")
+def measurements():
+    """The scenario's problem, its measurements, and the same as lines of text."""
+    problem, tracking = pz.load("b612-range", seed=3)
+    lines = [f"{t!r},{z!r}" for t, z in zip(tracking.times.tolist(), tracking.values[:, 0].tolist(), strict=True)]
+    return problem, tracking, ["time,range", *lines]
+
+
+def test_the_estimates_are_those_of_the_whole_run(measurements):
+    problem, tracking, lines = measurements
+    done = run("-", text="\n".join(lines) + "\n")
+    assert done.returncode == 0
+    rows = np.array([[float(v) for v in line.split(",")] for line in done.stdout.splitlines()[1:]])
+    whole = pz.ExtendedKalmanFilter().estimate(problem, tracking)
+    np.testing.assert_array_equal(rows[:, 0], tracking.times)
+    np.testing.assert_array_equal(rows[:, 1:5], whole.mean)
+    assert "100 measurements taken" in done.stderr
+
+
+def test_each_estimate_is_there_before_the_next_measurement_comes(measurements):
+    _, _, lines = measurements
+    with subprocess.Popen(
+        [*FOLLOW, "-", "--json"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as tool:
+        tool.stdin.write(lines[0] + "\n")
+        for line in lines[1:4]:
+            tool.stdin.write(line + "\n")
+            tool.stdin.flush()
+            answer = json.loads(tool.stdout.readline())  # would block for ever if it were held back
+            assert answer["time"] == float(line.split(",")[0])
+            assert len(answer["mean"]) == len(answer["sigma"]) == 4
+        tool.stdin.close()
+        assert tool.stdout.read() == ""
+        assert tool.wait(timeout=60) == 0
+
+
+def test_bad_lines_are_reported_and_skipped(measurements):
+    problem, tracking, lines = measurements
+    bad = [*lines[:3], "nonsense", "0.15,inf", "# a remark", "", "0.17", *lines[3:], "0.05,11.0"]
+    done = run("-", text="\n".join(bad) + "\n")
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    for expected in ("line 4", "line 5", "line 8", f"line {len(bad)}: time 0.05 s is before", "4 lines skipped"):
+        assert expected in done.stderr
+    whole = pz.ExtendedKalmanFilter().estimate(problem, tracking)
+    assert [float(v) for v in done.stdout.splitlines()[-1].split(",")][1:5] == whole.mean[-1].tolist()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text", "message"),
+    [
+        (("-",), "", "there are no measurements"),
+        (("-",), "time,rang\n0,1\n", "did you mean 'range'"),
+        (("nowhere.csv",), "", "nowhere.csv"),
+        (("-", "--with", "graph"), "time,range\n", "goes forward"),
+        (("-", "--with", "ekf", "--with", "window:3"), "time,range\n", "one estimator"),
+    ],
+)
+def test_what_cannot_be_followed_is_one_clear_line(arguments, text, message):
+    done = run(*arguments, text=text)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not done.stdout
+
+
+def test_a_checkpoint_of_something_else_is_refused(measurements, tmp_path):
+    _, _, lines = measurements
+    text = "\n".join(lines) + "\n"
+    state = tmp_path / "state.npz"
+    assert run("-", "--checkpoint", state, text=text).returncode == 0
+    other = run("-", "--with", "window:5", "--checkpoint", state, text=text)
+    assert other.returncode == 2
+    assert "another problem or estimator" in other.stderr
+    state.write_bytes(state.read_bytes()[:100])
+    damaged = run("-", "--checkpoint", state, text=text)
+    assert damaged.returncode == 2
+    assert "Traceback" not in damaged.stderr
+
+
+def test_a_stream_that_goes_on_is_taken_whole(measurements, tmp_path):
+    """The first half, then the second half as a stream of its own: what a restarted sensor sends."""
+    problem, tracking, lines = measurements
+    state, first, second = tmp_path / "state.npz", lines[:51], [lines[0], *lines[51:]]
+    assert run("-", "--checkpoint", state, text="\n".join(first) + "\n").returncode == 0
+    done = run("-", "--checkpoint", state, text="\n".join(second) + "\n")
+    whole = pz.ExtendedKalmanFilter().estimate(problem, tracking)
+    assert [float(v) for v in done.stdout.splitlines()[-1].split(",")][1:5] == whole.mean[-1].tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("estimator", ["ekf", "window:8"])
+def test_killed_at_random_moments_it_resumes_to_the_same_bytes(measurements, tmp_path, estimator):
+    """SIGKILL ten times for each estimator; the measurements trickle in, so that the moments fall all over the run."""
+    problem, _, _ = measurements
+    tracking = pz.simulate(problem, np.arange(400) * 0.1, np.random.default_rng(5))
+    lines = [
+        "time,range",
+        *(f"{t!r},{z!r}" for t, z in zip(tracking.times.tolist(), tracking.values[:, 0].tolist(), strict=True)),
+    ]
+    rows = tmp_path / "rows.csv"
+    rows.write_text("\n".join(lines) + "\n")
+    whole, out, state = tmp_path / "whole.csv", tmp_path / "out.csv", tmp_path / "state.npz"
+    settings = ["--with", estimator]
+    assert run(rows, *settings, "-o", whole).returncode == 0
+    moments = random.Random(7)
+    for _ in range(10):
+        with subprocess.Popen(
+            [*FOLLOW, "-", *settings, "-o", str(out), "--checkpoint", str(state)],
+            stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as tool:
+            end = time.monotonic() + moments.uniform(0.8, 2.5)
+            for line in lines:
+                if time.monotonic() > end:
+                    break
+                tool.stdin.write(line + "\n")
+                tool.stdin.flush()
+                time.sleep(0.004)
+            tool.kill()
+            tool.stdin.close() if not tool.stdin.closed else None
+    assert out.exists()
+    assert run(rows, *settings, "-o", out, "--checkpoint", state).returncode == 0
+    assert out.read_bytes() == whole.read_bytes()

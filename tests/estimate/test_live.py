@@ -1,0 +1,133 @@
+"""One measurement at a time: the numbers of the whole run, checkpoints, late and refused measurements."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import piazzi as pz
+
+
+@pytest.fixture(scope="module")
+def bearings(data_dir):
+    return pz.load(data_dir / "satellite" / "slide_example.npz")
+
+
+def test_the_filter_gives_the_whole_run_bit_for_bit(bearings):
+    problem, tracking = bearings
+    whole = pz.ExtendedKalmanFilter().estimate(problem, tracking)
+    live = pz.ExtendedKalmanFilter().start(problem)
+    for k, t in enumerate(tracking.times):
+        live.predict(t)
+        live.update(problem.stations[0].name, tracking.values[k, 0])
+        assert_array_equal(live.mean, whole.mean[k])
+        assert_array_equal(live.covariance, whole.covariance[k])
+        assert_array_equal(live.innovation, whole.innovations[k])
+    assert live.time == tracking.times[-1]
+
+
+@pytest.mark.parametrize(("lag", "iterations"), [(1, 1), (10, 1), (5, 3)])
+def test_the_window_gives_the_whole_run_bit_for_bit(bearings, lag, iterations):
+    problem, tracking = bearings
+    estimator = pz.SlidingWindow(lag=lag, iterations=iterations)
+    whole = estimator.estimate(problem, tracking)
+    live = estimator.start(problem)
+    for k, t in enumerate(tracking.times[:200]):
+        assert live.update(problem.stations[0].name, tracking.values[k], t)
+        assert_array_equal(live.mean, whole.mean[k])
+        assert_array_equal(live.covariance, whole.covariance[k])
+    assert len(live.times) == lag
+
+
+@pytest.fixture
+def two_radars():
+    model = pz.Model(["x", "v"], ["v", "-x"], [pz.Sensor("range", ["sqrt((x - a)**2 + 1)"])])
+    stations = [pz.Station("east", "range", 0.01, {"a": 3}), pz.Station("west", "range", 0.04, {"a": -3})]
+    problem = pz.Problem(model, pz.Gaussian([1, 0], np.eye(2)), pz.ProcessNoise([0, 0.01]), stations)
+    return problem, pz.simulate(problem, np.cumsum(np.random.default_rng(3).uniform(0.1, 0.4, 30)), np.random.default_rng(4))
+
+
+@pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.SlidingWindow(lag=6)])
+def test_several_stations_of_one_epoch_are_one_epoch(two_radars, estimator, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem, tracking = two_radars
+    whole = estimator.estimate(problem, tracking)
+    live = estimator.start(problem)
+    for t, name, z in zip(tracking.row_times, tracking.row_stations, tracking.values, strict=True):
+        live.update(str(name), z, t)
+    assert_allclose(live.mean, whole.mean[-1], rtol=0, atol=1e-13)
+    assert_allclose(live.covariance, whole.covariance[-1], rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.SlidingWindow(lag=6, iterations=2)])
+def test_a_checkpoint_resumes_to_the_same_bits(two_radars, estimator, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem, tracking = two_radars
+    rows = list(zip(tracking.row_times, tracking.row_stations, tracking.values, strict=True))
+    one = estimator.start(problem)
+    for t, name, z in rows[:31]:  # in the middle of an epoch
+        one.update(str(name), z, t)
+    other = estimator.start(problem)
+    other.restore(one.checkpoint())
+    for t, name, z in rows[31:]:
+        one.update(str(name), z, t)
+        other.update(str(name), z, t)
+    assert_array_equal(one.mean, other.mean)
+    assert_array_equal(one.covariance, other.covariance)
+
+
+def test_a_checkpoint_of_another_problem_is_refused(two_radars, bearings, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    saved = pz.ExtendedKalmanFilter().start(two_radars[0]).checkpoint()
+    with pytest.raises(ValueError, match="has shape"):
+        pz.ExtendedKalmanFilter().start(bearings[0]).restore(saved)
+    with pytest.raises(ValueError, match="the checkpoint has no"):
+        pz.SlidingWindow().start(two_radars[0]).restore(saved)
+
+
+def test_a_late_measurement_is_taken_in_its_place_on_a_linear_problem(monkeypatch):
+    """On a linear problem the order of arrival cannot matter while everything is inside the window."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x", "v"], ["v", "0"], [pz.Sensor("position", ["x"])])
+    problem = pz.Problem(model, pz.Gaussian([0, 1], np.eye(2)), pz.ProcessNoise([0, 0.1]), [pz.Station("a", "position", 0.1)])
+    tracking = pz.simulate(problem, np.arange(1.0, 11.0), np.random.default_rng(0))
+    rows = list(zip(tracking.row_times, tracking.values[:, 0], strict=True))
+    in_order, late = pz.SlidingWindow(lag=20).start(problem), pz.SlidingWindow(lag=20).start(problem)
+    for t, z in rows:
+        in_order.update("a", z, t)
+    for t, z in [*rows[:4], *rows[6:], *rows[4:6]]:
+        assert late.update("a", z, t)
+    assert_allclose(late.mean, in_order.mean, atol=1e-12)
+    assert_allclose(late.covariance, in_order.covariance, atol=1e-12)
+    assert_array_equal(late.times, in_order.times)
+
+
+def test_a_measurement_older_than_the_window_is_refused_by_name(two_radars, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem, tracking = two_radars
+    live = pz.SlidingWindow(lag=3).start(problem)
+    for t, name, z in zip(tracking.row_times, tracking.row_stations, tracking.values, strict=True):
+        live.update(str(name), z, t)
+    before = live.mean.copy()
+    assert live.update("west", [3.0], tracking.times[0]) is False
+    assert live.refused == [(tracking.times[0], "west")]
+    assert_array_equal(live.mean, before)
+
+
+def test_what_cannot_be_taken_is_said(two_radars, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem, _ = two_radars
+    for estimator in (pz.ExtendedKalmanFilter(), pz.SlidingWindow()):
+        live = estimator.start(problem)
+        with pytest.raises(ValueError, match="time"):
+            live.update("east", 3.0)
+        live.update("east", 3.0, 1.0)
+        with pytest.raises(ValueError, match="unknown station 'eats'; did you mean 'east'"):
+            live.update("eats", 3.0, 2.0)
+        with pytest.raises(ValueError, match="must be 1 numbers"):
+            live.update("east", [1.0, 2.0], 2.0)
+        with pytest.raises(ValueError, match="write NaN"):
+            live.update("east", np.inf, 2.0)
+        with pytest.raises(ValueError, match="before 1 s"):
+            live.predict(0.5)
+        live.update("east", np.nan, 2.0)
+        assert np.isfinite(live.mean).all()

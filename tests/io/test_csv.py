@@ -1,0 +1,197 @@
+"""Comma-separated measurements: exact both ways, the same quickly as with care, and every fault with its line."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import piazzi as pz
+from piazzi.io import cells, save
+from piazzi.io.csv import read_csv, write_csv
+from tests.references.drawn import FLOATS, TEXT, problems, same_bits, same_tracking, trackings
+
+QUIET = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+MODEL = pz.Model(
+    ["x", "v"],
+    ["v", "0"],
+    [pz.Sensor("radar", {"range": "x", "range_rate": "v"}), pz.Sensor("camera", {"bearing": "atan2(x, 1)"}, ["bearing"])],
+)
+PROBLEM = pz.Problem(
+    MODEL, pz.Gaussian([1, 0], [1, 1]), None, [pz.Station("west", "radar", [1, 1]), pz.Station("north", "camera", 1e-4)]
+)
+ALONE = pz.Problem(MODEL, pz.Gaussian([1, 0], [1, 1]), None, [pz.Station("north", "camera", 1e-4)])
+GOOD = """\
+time,station,range,range_rate,bearing
+0.0,west,1.5,,
+0.5,west,1.4,-0.1,
+0.5,north,,,0.25
+"""
+
+
+def read(tmp_path, text, problem=PROBLEM):
+    path = tmp_path / "a.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_csv(path, problem)
+
+
+def test_components_find_their_columns_by_name(tmp_path):
+    tracking = read(tmp_path, GOOD)
+    assert_array_equal(tracking.row_times, [0, 0.5, 0.5])
+    assert list(tracking.row_stations) == ["west", "west", "north"]
+    assert_array_equal(tracking.values, [[1.5, np.nan], [1.4, -0.1], [0.25, np.nan]])
+    assert tracking.truth is None
+
+
+def test_the_order_of_columns_means_nothing(tmp_path):
+    shuffled = "bearing,range_rate,time,range,station\n,,0.0,1.5,west\n,-0.1,0.5,1.4,west\n0.25,,0.5,,north\n"
+    assert same_tracking(read(tmp_path, shuffled), read(tmp_path, GOOD))
+
+
+def test_one_station_needs_no_column_and_angles_may_be_in_degrees(tmp_path):
+    tracking = read(tmp_path, "time [min], bearing [deg]\n0, 90\n1, nan\n2,-45\n", ALONE)
+    assert_allclose(tracking.values[:, 0], [np.pi / 2, np.nan, -np.pi / 4], rtol=1e-15)
+    assert_array_equal(tracking.times, [0, 60, 120])
+    assert tracking.row_stations is None
+
+
+@pytest.mark.parametrize(
+    "text", [GOOD.replace("\n", "\r\n"), "\ufeff" + GOOD, GOOD.rstrip("\n"), GOOD + "\n\n", "# a remark\n\n" + GOOD, GOOD.replace("west", ' "west"'[1:])]
+)  # fmt: skip
+def test_harmless_variants_are_the_same(tmp_path, text):
+    assert same_tracking(read(tmp_path, text), read(tmp_path, GOOD))
+
+
+@QUIET
+@given(st.data())
+def test_round_trip_is_exact(tmp_path, data):
+    problem = data.draw(problems())
+    tracking = data.draw(trackings(problem))
+    write_csv(tmp_path / "a.csv", problem, tracking)
+    assert same_tracking(read_csv(tmp_path / "a.csv", problem), tracking)
+
+
+@QUIET
+@given(
+    st.lists(st.tuples(FLOATS, st.floats(allow_infinity=False)), min_size=1, max_size=50),
+    st.lists(TEXT, min_size=1, max_size=3),
+)
+def test_the_fast_way_and_the_careful_way_agree(rows, names):
+    header = ["time", "station", "range"]
+    lines = [f"{t!r},{names[i % len(names)]},{'' if np.isnan(v) else repr(v)}" for i, (t, v) in enumerate(rows)]
+    body = "\n".join(lines).encode()
+    fast, careful = cells.fast(body, 2, header, ()), None
+    try:
+        careful = cells.careful(body, 2, header, ())
+    except ValueError:
+        assert fast is None
+    if fast is not None:
+        assert careful is not None
+        assert all(same_bits(fast.numbers[name], careful.numbers[name]) for name in ("time", "range"))
+        assert [fast.station_names[i] for i in fast.station] == [careful.station_names[i] for i in careful.station]
+        assert list(fast.lines) == careful.lines
+
+
+ALPHABET = st.sampled_from(
+    [*"0123456789.,,,,\n\n+-eE _\"'#\r\t\0xaT", "nan", "inf", "True", "false", "1e", "west", "é", ",,", "1.5", "0x1", "١"]
+)
+
+
+@settings(max_examples=300)
+@given(
+    st.lists(ALPHABET, max_size=30).map("".join),
+    st.sampled_from([["time"], ["time", "range"], ["time", "station"], ["time", "station", "range"]]),
+)
+def test_whatever_the_fast_way_takes_the_careful_way_takes_too(text, header):
+    body = text.strip("\n").encode()
+    fast = cells.fast(body, 2, header, ())
+    if fast is not None:
+        careful = cells.careful(body, 2, header, ())
+        assert all(same_bits(fast.numbers[name], careful.numbers[name]) for name in careful.numbers)
+        assert list(fast.lines) == careful.lines
+
+
+def test_every_double_survives(tmp_path):
+    """Over the bit patterns of doubles, and more than one block of the fast way."""
+    bits = np.random.default_rng(0).integers(0, 2**63, 60_000, dtype=np.uint64) | np.arange(
+        60_000, dtype=np.uint64
+    ) % 2 << np.uint64(63)
+    values = bits.view(float)
+    values = values[np.isfinite(values)]
+    tracking = pz.Tracking(np.arange(len(values)) * 0.1, values)
+    save(tmp_path / "a.csv", ALONE, tracking)
+    assert same_tracking(read_csv(tmp_path / "a.csv", ALONE), tracking)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "the file is empty"),
+        ("\n\n", "the file is empty"),
+        ("# only a remark\n", "the file is empty"),
+        ("time,station,range\n", "there are no measurements"),
+        ("time,station,rnge\n0,west,1\n", "unknown column 'rnge'; did you mean 'range'"),
+        ("t,station,range\n0,west,1\n", "unknown column 't'"),
+        ("station,range\nwest,1\n", "there is no column 'time'"),
+        ("time,station\n0,west\n", "there is no column of measurements (bearing, range, range_rate)"),
+        ("time,range\n0,1\n", "there is no column 'station'; the problem has west, north"),
+        ("time,time,range\n0,0,1\n", "line 1: two columns are called 'time'"),
+        ("time,,range\n0,0,1\n", "line 1: column 2 has no name"),
+        ("time [parsec],station,range\n0,west,1\n", "unknown unit 'parsec'"),
+        ("time,station,range\n0,west,1\n1,west\n", "line 3 has 2 cells; the header names 3 (time, station, range)"),
+        ("time,station,range\n0,west,1,2\n", "line 2 has 4 cells"),
+        ("time,station,range\n0,west,1\n\n1,west,abc\n", "line 4: range is 'abc'; it must be a number"),
+        ("time,station,range\n0,west,1\n1,west,1_0\n", "line 3: range is '1_0'"),
+        ("time,station,range\n0,west,1\n1,west,0x10\n", "line 3: range is '0x10'"),
+        ("time,station,range\n0,west,1\nabc,west,1\n", "line 3: time is 'abc'"),
+        ("time,station,range\n0,west,1\n,west,1\n", "line 3: the time is missing"),
+        ("time,station,range\n0,west,1\ninf,west,1\n", "line 3: the time is inf"),
+        ("time,station,range\n0,west,1\n1,west,1\n0.5,west,1\n", "line 4: times must increase, but 0.5 s comes after 1 s"),
+        ("time,station,range\n0,west,1\n1,wset,1\n", "line 3: unknown station 'wset'; did you mean 'west'"),
+        ("time,station,range\n0,west,1\n1,,1\n", "line 3: the station has no name"),
+        ("time,station,range\n0,west,1\n1,north,1\n", "line 3: range is 1, but station 'north' measures bearing"),
+        ("time,station,range\n0,west,1\n1,west,-inf\n", "line 3: range is -inf; leave the cell empty"),
+        ("time,station,range\n0,west,\n1,west,\n", "every value is missing"),
+        ('time,station,range\n0,"west,1\n1,west,1\n', "line"),
+        ('time,station,range\n0,we"st,1\n', "unknown station"),
+        ("time,station,range,truth:x\n0,west,1,1\n", "the truth has no column 'truth:v'"),
+        (b"time,station,range\n0,west,1\n1,w\xffst,1\n", "line 3: it is not UTF-8 text: byte 0xff"),
+        (b"time,station,range\n0,west,\0\n", "it is not text"),
+        (b"PK\3\4\0\0\0", "it is not text"),
+        ("time,station,range\n0,west,\x1b[31m\n", "\\x1b[31m"),
+        ("x" * 200_000 + "\n", "line 1: field larger than field limit"),
+        ("time,station,range\n0,west," + "1" * 200_000 + "x\n", "line 2: field larger than field limit"),
+        (",".join(f"c{i}" for i in range(2000)), "there are 2000 columns"),
+    ],
+)  # fmt: skip
+def test_faults_are_told_with_their_line(tmp_path, text, says):
+    for size in (0, 2**19):  # the fast way and the careful one must tell the same
+        with pytest.MonkeyPatch.context() as patch, pytest.raises(ValueError, match="a.csv: ") as error:
+            patch.setattr(cells, "SMALL", size)
+            read(tmp_path, text)
+        assert says in str(error.value)
+        assert str(error.value).isprintable()
+        assert len(str(error.value)) < 600
+
+
+def test_a_component_called_like_another_column_is_refused(tmp_path):
+    model = pz.Model(["x"], ["0"], [pz.Sensor("s", {"time": "x"})])
+    problem = pz.Problem(model, pz.Gaussian([1], [1]), None, [pz.Station("a", "s", 1)])
+    with pytest.raises(ValueError, match="two columns would be called 'time'"):
+        write_csv(tmp_path / "a.csv", problem, pz.Tracking([0], [1]))
+
+
+@pytest.mark.slow
+def test_a_million_measurements_load_in_two_seconds(tmp_path):
+    import time
+
+    J = 10**6
+    rng = np.random.default_rng(0)
+    tracking = pz.Tracking(np.arange(J) * 0.1, rng.normal(size=(J, 2)), np.tile(["west"], J))
+    write_csv(tmp_path / "a.csv", PROBLEM, tracking)
+    import pandas  # noqa: F401
+
+    started = time.process_time()
+    again = read_csv(tmp_path / "a.csv", PROBLEM)
+    assert time.process_time() - started < 2.0
+    assert same_tracking(again, tracking)

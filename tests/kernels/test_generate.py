@@ -1,0 +1,92 @@
+"""Generated modules: the same text everywhere, every function of the language also when loaded from disk, arrays checked."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import piazzi as pz
+from piazzi.expressions import FUNCTIONS
+from piazzi.kernels import cache
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SOURCES = """
+import hashlib, numpy as np, piazzi as pz
+from tests.laws.problems import b612, network, satellite
+for problem in (satellite(), satellite(pz.RungeKutta4(2)), b612(), network(np.random.default_rng(0))):
+    for backend in ("plain", "compiled"):
+        print(hashlib.sha256(problem.spec("transition", "filter").source(backend).encode()).hexdigest())
+"""
+
+
+def test_sources_are_the_same_in_every_process():
+    """Whatever the order in which sets are walked: else the same seed would not give the same bytes on two machines."""
+    printed = set()
+    for seed in ("0", "1", "2"):
+        env = {**os.environ, "PYTHONHASHSEED": seed}
+        run = subprocess.run([sys.executable, "-c", SOURCES], check=True, capture_output=True, text=True, cwd=ROOT, env=env)
+        printed.add(run.stdout)
+    assert len(printed) == 1
+    assert len(set(printed.pop().split())) == 8
+
+
+def everything() -> pz.Problem:
+    """A model in whose rates and measurements every function of the language occurs."""
+    one = [f"{name}(0.2 + x*x/9)" for name, arity in sorted(FUNCTIONS.items()) if arity == 1]
+    two = [f"{name}(x, y + 2)" for name, arity in sorted(FUNCTIONS.items()) if arity == 2]
+    rates = [" + ".join(one), " - ".join(two) + " + x**y + y**(1/3)"]
+    model = pz.Model(["x", "y"], rates, [pz.Sensor("s", [f"x*({' + '.join(one)})"])])
+    return pz.Problem(model, pz.Gaussian([0.7, 1.2], np.eye(2)), None, pz.Station("s", "s", 1.0), integrator=pz.Taylor(1))
+
+
+def test_every_function_of_the_language_compiles_and_loads(monkeypatch):
+    """Compiled, read back from disk into code without Numba, and uncompiled: the same numbers."""
+    problem, x = everything(), np.array([[0.7, 1.2], [0.3, 0.9], [-0.4, 2.0]])
+    results = []
+    for jit in ("1", "1", "0"):
+        monkeypatch.setenv("PIAZZI_JIT", jit)
+        monkeypatch.setattr(cache, "_loaded", {})
+        results.append([problem.dynamics(x), problem.dynamics_jacobian(x), problem.measure("s", x), problem.measurement_jacobian("s", x)])
+    for first, again, plain in zip(*results, strict=True):
+        assert np.isfinite(first).all()
+        assert_allclose(again, first, rtol=0, atol=0)
+        assert_allclose(plain, first, rtol=1e-12, atol=1e-13)
+
+
+def test_arrays_that_a_kernel_could_misread_are_refused():
+    from piazzi.kernels.library import POINTER, Entry
+
+    entry = Entry(0, (POINTER,), None)
+    for array in (np.zeros((4, 4))[:, ::2], np.zeros(3, dtype=np.float32), np.zeros(3, dtype=complex), np.zeros(3, dtype=bool), np.zeros(3, dtype=">f8")):
+        with pytest.raises(TypeError, match="a kernel needs contiguous float64 or int64"):
+            entry(array)
+
+
+def test_only_the_entries_of_a_module_are_public():
+    problem = everything()
+    library = cache.load(problem.spec("transition", "rates"))
+    assert set(vars(library)) == {"evaluate_dynamics", "evaluate_dynamics_jacobian"}
+
+
+def test_first_compilation_is_told_in_one_line(monkeypatch, caplog, tmp_path):
+    from piazzi.kernels import folder
+
+    monkeypatch.setenv("PIAZZI_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(cache, "_loaded", {})
+    monkeypatch.setattr(cache, "compile_entries", lambda path, names: ({}, {}))
+    folder.private_folder.cache_clear()
+    folder.writable_folder.cache_clear()
+    try:
+        with caplog.at_level("INFO", logger="piazzi.kernels"):
+            cache.load(everything().spec("transition", "rates"))
+            cache.load(everything().spec("transition", "rates"))
+    finally:
+        folder.private_folder.cache_clear()
+        folder.writable_folder.cache_clear()
+    assert len(caplog.messages) == 1
+    assert "compiling rates for x, y, once" in caplog.messages[0]

@@ -1,0 +1,35 @@
+"""A problem as tables, and back: nothing changes, not a bit."""
+
+import json
+
+import pytest
+from hypothesis import given
+
+import piazzi as pz
+from piazzi.scenarios import load_scenario, names
+from piazzi.scenarios.write import problem_from_tables, problem_to_tables
+from tests.references.drawn import problems, same_problem
+
+
+@given(problems())
+def test_tables_give_the_problem_back(problem):
+    tables = json.loads(json.dumps(problem_to_tables(problem), allow_nan=False))
+    assert same_problem(problem_from_tables(tables, problem.name, "here"), problem)
+
+
+@pytest.mark.parametrize("name", [*names(), "template"])
+def test_tables_give_the_built_in_problems_back(name):
+    problem = load_scenario(name).problem
+    again = problem_from_tables(problem_to_tables(problem), name, "here")
+    assert same_problem(again, problem)
+    assert again.model is problem.model
+
+
+def test_an_integrator_without_a_name_is_refused():
+    class Own(pz.RungeKutta4):
+        pass
+
+    problem = load_scenario("b612-range").problem
+    own = pz.Problem(problem.model, problem.prior, None, problem.stations, problem.parameters, Own())
+    with pytest.raises(ValueError, match="integrator Own cannot be written"):
+        problem_to_tables(own)
