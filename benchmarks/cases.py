@@ -82,3 +82,9 @@ def solved(case: Case | None = None) -> tuple[Any, Any]:
 def calls(estimator: Any, cases: list[Case]) -> list[Any]:
     """One call of ``estimate`` for each case."""
     return [lambda case=case: estimator.estimate(*case) for case in cases]
+
+
+def apart(mean: np.ndarray, estimate: Any) -> str:
+    """How far these states (K, n) are from an estimate's at most, in its standard deviations: whether both did the same."""
+    sigma = np.sqrt(np.diagonal(estimate.covariance, axis1=1, axis2=2))
+    return f"{float((np.abs(mean - estimate.mean) / sigma).max()):.0e} sigma apart"

@@ -12,7 +12,21 @@ import pytest
 import piazzi
 
 ROOT = Path(__file__).resolve().parent.parent
-HEAVY = {"numpy", "sympy", "numba", "llvmlite", "matplotlib", "xarray", "scipy", "pandas", "pydantic", "h5py", "h5netcdf", "rich", "dask"}
+HEAVY = {
+    "numpy",
+    "sympy",
+    "numba",
+    "llvmlite",
+    "matplotlib",
+    "xarray",
+    "scipy",
+    "pandas",
+    "pydantic",
+    "h5py",
+    "h5netcdf",
+    "rich",
+    "dask",
+}
 
 
 def loaded_after(code: str, **env: str) -> set[str]:

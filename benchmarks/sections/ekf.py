@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
-from cases import Case, calls, floor, variants
+from cases import Case, apart, calls, floor, recording, variants
 from figures import Figure, interleaved
 
 import piazzi as pz
@@ -20,6 +21,12 @@ def figures() -> Iterator[Figure]:
     yield from _beside("RK4, 10 substeps", "ekf_rk4", variants(REPEATS + 1, integrator=pz.RungeKutta4(10)))
 
 
+def _recorded(case: Case) -> Case:
+    """The recording itself with the settings of a variant of it."""
+    problem, tracking = pz.load(recording())
+    return replace(problem, integrator=case[0].integrator), tracking
+
+
 def _beside(what: str, workload: str, cases: list[Case]) -> Iterator[Figure]:
     estimator = pz.ExtendedKalmanFilter()
     estimates: list[Any] = []
@@ -31,7 +38,8 @@ def _beside(what: str, workload: str, cases: list[Case]) -> Iterator[Figure]:
         return floor().seconds(workload, 3)
 
     seconds, ratio = interleaved([lambda case=case: run(case) for case in cases], c)
-    note = "problem and tracking new at every call"
+    theirs = floor().ekf(rk4=workload == "ekf_rk4")[0]
+    note = f"problem and tracking new at every call; {apart(theirs, estimator.estimate(*_recorded(cases[0])))}"
     yield Figure(f"EKF, {what}", seconds * 1e3, "ms", ratio=ratio, to="C floor", bound=BOUND, note=note)
     again, ratio = interleaved(calls(estimator, [(cases[0][0], pz.Tracking(t.row_times, t.values)) for _, t in cases]), c)
     yield Figure("  tracking alone new at every call", again * 1e3, "ms", ratio=ratio, to="C floor")

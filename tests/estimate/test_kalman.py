@@ -85,7 +85,10 @@ def test_wrong_arguments_of_the_building_blocks():
         (lambda: pz.predict(problem, problem.prior, 0.0, 0.0), "dt is 0.0 s; a prediction goes forward"),
         (lambda: pz.predict(problem, problem.prior, 0.0, np.nan), "dt is nan s"),
         (lambda: pz.predict(problem, pz.Gaussian([1.0], np.eye(4)), 0.0, 1.0), "mean has 1 values; it needs 4"),
-        (lambda: pz.predict(problem, pz.Gaussian(np.ones(4), -np.eye(4)), 0.0, 1.0), "covariance must be positive semidefinite"),
+        (
+            lambda: pz.predict(problem, pz.Gaussian(np.ones(4), -np.eye(4)), 0.0, 1.0),
+            "covariance must be positive semidefinite",
+        ),
         (lambda: pz.update(problem, problem.prior, "rader", 1.0), "unknown station 'rader'; did you mean 'radar'"),
         (lambda: pz.update(problem, problem.prior, "radar", [1.0, 2.0]), "must be 1 numbers, NaN where missing"),
         (lambda: pz.update(problem, problem.prior, "radar", np.inf), "measurement of station 'radar' is inf"),
@@ -141,7 +144,9 @@ def test_estimated_constant_is_found():
 
 def test_failure_is_told_with_epoch_and_time():
     """The state falls into the centre of attraction: no exception, no success, and where it happened."""
-    problem = b612(prior=pz.Gaussian([1e-6, 0.0, 0.0, 0.0], 1e-20 * np.eye(4)), process_noise=np.zeros(4), integrator=pz.Taylor(1))
+    problem = b612(
+        prior=pz.Gaussian([1e-6, 0.0, 0.0, 0.0], 1e-20 * np.eye(4)), process_noise=np.zeros(4), integrator=pz.Taylor(1)
+    )
     estimate = pz.ExtendedKalmanFilter().estimate(problem, pz.Tracking(np.arange(5) * 1e200, np.full(5, 10.0)))
     assert not estimate.success
     assert "the estimate is not finite from epoch" in estimate.message

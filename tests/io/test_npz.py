@@ -130,7 +130,7 @@ class Evil:
         ({"dt": np.inf}, "key 'dt' is inf"),
         ({"dt": 1e300}, "too many one-second substeps"),
         ({"dt": np.ones(3)}, "key 'dt' is an array of shape (3,)"),
-        ({"meas": np.zeros(0)}, "key 'meas' has no measurements"),
+        ({"meas": np.zeros(0), "truth": None}, "key 'meas' has no measurements"),
         ({"meas": np.full(20, np.nan)}, "key 'meas' has no measurements"),
         ({"meas": np.where(np.arange(20) == 5, np.inf, 1.0)}, "key 'meas' is inf at 5"),
         ({"meas": np.ones((20, 2))}, "key 'meas' has shape (20, 2)"),

@@ -256,10 +256,10 @@ def unwritable(monkeypatch, place: Path) -> None:
     """Make the folder read-only, for root too."""
     make = folder.tempfile.TemporaryFile
 
-    def refuse(*args, dir=None, **kwargs):
-        if dir is not None and Path(dir) == place:
-            raise PermissionError(13, "Permission denied", str(dir))
-        return make(*args, dir=dir, **kwargs)
+    def refuse(*args, **options):
+        if Path(options.get("dir") or ".") == place:
+            raise PermissionError(13, "Permission denied", str(place))
+        return make(*args, **options)
 
     monkeypatch.setattr(folder.tempfile, "TemporaryFile", refuse)
     place.chmod(0o500)
@@ -351,7 +351,9 @@ def environment(place: Path, **more: str) -> dict[str, str]:
 
 
 def start(code: str, env: dict[str, str], **options) -> subprocess.Popen:
-    return subprocess.Popen([sys.executable, "-c", code], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+    return subprocess.Popen(
+        [sys.executable, "-c", code], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
+    )
 
 
 def finished(process: subprocess.Popen) -> str:

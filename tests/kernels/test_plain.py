@@ -11,7 +11,11 @@ from hypothesis import strategies as st
 from piazzi.kernels import compiled, plain, vocabulary
 from tests.kernels.test_lanes import call
 
-PUBLIC = {name for name, value in vars(plain).items() if not name.startswith("_") and not inspect.ismodule(value)} - {"annotations", "Callable", "Any"}
+PUBLIC = {name for name, value in vars(plain).items() if not name.startswith("_") and not inspect.ismodule(value)} - {
+    "annotations",
+    "Callable",
+    "Any",
+}
 
 
 def test_both_vocabularies_have_the_same_words():
@@ -26,7 +30,9 @@ def test_angle_is_wrapped_into_half_open_turn(a):
     assert math.cos(w - a) == pytest.approx(1.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(("a", "wrapped"), [(0.0, 0.0), (math.pi, math.pi), (-math.pi, math.pi), (3 * math.pi, math.pi), (4.0, 4.0 - 2 * math.pi)])
+@pytest.mark.parametrize(
+    ("a", "wrapped"), [(0.0, 0.0), (math.pi, math.pi), (-math.pi, math.pi), (3 * math.pi, math.pi), (4.0, 4.0 - 2 * math.pi)]
+)
 def test_minus_pi_is_pi(a, wrapped):
     assert plain.wrap_angle(a) == pytest.approx(wrapped, abs=1e-15)
 
@@ -37,7 +43,24 @@ def test_small_angles_are_untouched():
         assert plain.wrap_angle(a) == a
 
 
-FUNCTIONS_OF_ONE = ["sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "fabs", "sign", "heaviside", "wrap_angle"]
+FUNCTIONS_OF_ONE = [
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "sinh",
+    "cosh",
+    "tanh",
+    "exp",
+    "log",
+    "sqrt",
+    "fabs",
+    "sign",
+    "heaviside",
+    "wrap_angle",
+]
 FUNCTIONS_OF_TWO = ["atan2", "pow", "maximum", "minimum", "unless_missing"]
 NUMBERS = np.array([0.0, -0.0, 0.5, 1.0, -1.0, 2.5, -700.0, 1e3, 1e308, -1e308, np.inf, -np.inf, np.nan])
 

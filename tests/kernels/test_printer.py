@@ -39,10 +39,11 @@ def with_gradient(e: sp.Expr) -> list[sp.Expr]:
 
 
 # Every function with arguments at which it is defined, and powers of every kind
-unary = ["sin({0})", "cos({0})", "tan({0}/4)", "asin(tanh({0})/2)", "acos(tanh({0})/2)", "atan({0})", "sinh({0}/3)", "cosh({0}/3)",
-         "tanh({0})", "exp({0}/3)", "log(1 + abs({0}))", "sqrt(2 + sin({0}))", "abs({0})", "sign({0})", "-({0})"]  # fmt: skip
-binary = ["({0}) + ({1})", "({0}) - ({1})", "({0})*({1})", "({0})/(2 + ({1})**2)", "atan2({0}, 2 + cos({1}))", "hypot({0}, {1} + 5)",
-          "min({0}, {1})", "max({0}, {1})", "(1 + abs({0}))**({1}/5)"]  # fmt: skip
+unary = ["sin({0})", "cos({0})", "tan({0}/4)", "asin(tanh({0})/2)", "acos(tanh({0})/2)", "atan({0})", "sinh({0}/3)",
+         "cosh({0}/3)", "tanh({0})", "exp({0}/3)", "log(1 + abs({0}))", "sqrt(2 + sin({0}))", "abs({0})", "sign({0})",
+         "-({0})"]  # fmt: skip
+binary = ["({0}) + ({1})", "({0}) - ({1})", "({0})*({1})", "({0})/(2 + ({1})**2)", "atan2({0}, 2 + cos({1}))",
+          "hypot({0}, {1} + 5)", "min({0}, {1})", "max({0}, {1})", "(1 + abs({0}))**({1}/5)"]  # fmt: skip
 powers = ["({0})**{k}", "(1 + ({0})**2)**({k}/2)", "(2 + sin({0}))**({k}.5)", "(3 + cos({0}))**(-{k}/2)"]
 leaves = st.sampled_from([*NAMES, "x*y", "x + y", "2", "0.3", "-1.75", "pi", "1/3"])
 
@@ -70,7 +71,11 @@ def test_printed_source_equals_sympy(text, at):
     assume(np.isfinite(moved).all())
     slack = 1e-11 * (1 + np.abs(wanted)) + 100 * np.abs(np.subtract(moved, wanted))
     assume(slack.max() < 1e-4)
-    assert (np.abs(np.subtract(values(printed(*outputs), *at), wanted)) <= slack).all(), (text, values(printed(*outputs), *at), wanted)
+    assert (np.abs(np.subtract(values(printed(*outputs), *at), wanted)) <= slack).all(), (
+        text,
+        values(printed(*outputs), *at),
+        wanted,
+    )
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)
@@ -78,7 +83,14 @@ def test_every_function_of_the_language_has_a_compiled_form_and_a_derivative(fun
     """Also inside abs, sign, min and max, where SymPy's own derivative would allow for complex values."""
     call = f"{function}(x)" if FUNCTIONS[function] == 1 else f"{function}(x, y)"
     at = (0.4, 0.7, 0.1)
-    for text in (call, f"abs({call} - 2)", f"sign({call})*x", f"max({call}, z)", f"min({call}, y, -z)*abs({call})", f"abs(z*{call})"):
+    for text in (
+        call,
+        f"abs({call} - 2)",
+        f"sign({call})*x",
+        f"max({call}, z)",
+        f"min({call}, y, -z)*abs({call})",
+        f"abs(z*{call})",
+    ):
         outputs = with_gradient(to_sympy(text, SYMBOLS))
         got = values(printed(*outputs), *at)
         assert got[0] == pytest.approx(exact(outputs[0], *at), rel=1e-13)
@@ -90,7 +102,28 @@ def test_every_function_of_the_language_has_a_compiled_form_and_a_derivative(fun
 
 @pytest.mark.parametrize("text", ["x**{}", "(x**2 + y**2)**{}", "y*(x + 1)**{}"])
 @pytest.mark.parametrize(
-    "exponent", ["2", "3", "7", "31", "64", "-1", "-2", "-64", "(1/2)", "0.5", "(3/2)", "1.5", "(-3/2)", "-1.5", "-2.5", "(7/2)", "63.5", "2.0", "-3.0"]
+    "exponent",
+    [
+        "2",
+        "3",
+        "7",
+        "31",
+        "64",
+        "-1",
+        "-2",
+        "-64",
+        "(1/2)",
+        "0.5",
+        "(3/2)",
+        "1.5",
+        "(-3/2)",
+        "-1.5",
+        "-2.5",
+        "(7/2)",
+        "63.5",
+        "2.0",
+        "-3.0",
+    ],
 )
 def test_powers_by_integers_and_halves_are_products(text, exponent):
     """However they are written: as fractions or as decimals."""
@@ -123,7 +156,20 @@ def test_late_terms_come_last():
 
 
 @pytest.mark.parametrize(
-    "text", ["-x - y", "-(x - y)*-2", "x - (y - z)", "-x**2", "(-x)**2", "x/-y", "-(x*y)/(-z + 5)", "1 - 1/(1 - x)", "-sin(-x)", "2*-3*x", "-sqrt(x + 5)*-y"]
+    "text",
+    [
+        "-x - y",
+        "-(x - y)*-2",
+        "x - (y - z)",
+        "-x**2",
+        "(-x)**2",
+        "x/-y",
+        "-(x*y)/(-z + 5)",
+        "1 - 1/(1 - x)",
+        "-sin(-x)",
+        "2*-3*x",
+        "-sqrt(x + 5)*-y",
+    ],
 )
 def test_signs(text):
     e = to_sympy(text, SYMBOLS)

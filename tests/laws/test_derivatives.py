@@ -21,7 +21,11 @@ def driven(integrator, **changes):
     model = pz.Model(
         ["q", "v", "theta"],
         ["v", "-k*sin(q) - damping*v + cos(t*theta)", "exp(-t)*q*damping - theta**3/(1 + v**2)"],
-        [pz.Sensor("place", {"angle": "atan2(sin(q), bias + cos(q))", "rate": "v*sqrt(1 + theta**2) + t*scale"}, angles=["angle"])],
+        [
+            pz.Sensor(
+                "place", {"angle": "atan2(sin(q), bias + cos(q))", "rate": "v*sqrt(1 + theta**2) + t*scale"}, angles=["angle"]
+            )
+        ],
         {"k": "fixed", "damping": "estimated", "bias": "estimated"},
     )
     estimated = {"damping": pz.Gaussian(0.3, 0.01), "bias": pz.Gaussian(0.2, 0.04)}
@@ -33,8 +37,16 @@ def driven(integrator, **changes):
 
 def stepped(**changes):
     """A model that is a step itself, with the length of the step and an estimated constant in it."""
-    model = pz.Model(["a", "b"], ["a + dt*b*c - dt**2*sin(a)/2", "b*exp(-dt*c) + t*dt"], [pz.Sensor("sum", ["a + b*c"])], {"c": "estimated"}, discrete=True)
-    return pz.Problem(model, pz.Gaussian([0.4, -0.3], np.eye(2)), None, pz.Station("s", "sum", 1.0), {"c": pz.Gaussian(0.8, 1.0)}, **changes)
+    model = pz.Model(
+        ["a", "b"],
+        ["a + dt*b*c - dt**2*sin(a)/2", "b*exp(-dt*c) + t*dt"],
+        [pz.Sensor("sum", ["a + b*c"])],
+        {"c": "estimated"},
+        discrete=True,
+    )
+    return pz.Problem(
+        model, pz.Gaussian([0.4, -0.3], np.eye(2)), None, pz.Station("s", "sum", 1.0), {"c": pz.Gaussian(0.8, 1.0)}, **changes
+    )
 
 
 STEPS = {
@@ -59,7 +71,9 @@ def test_phi_is_the_derivative_of_the_step(name, seed):
     assert_allclose(Phi, numeric, rtol=1e-7, atol=1e-8)
 
 
-@pytest.mark.parametrize("make", [lambda: satellite(pz.Taylor(15)), lambda: satellite(pz.RungeKutta4(3)), b612], ids=["taylor", "rk4", "b612"])
+@pytest.mark.parametrize(
+    "make", [lambda: satellite(pz.Taylor(15)), lambda: satellite(pz.RungeKutta4(3)), b612], ids=["taylor", "rk4", "b612"]
+)
 def test_phi_is_the_derivative_of_the_step_on_the_founding_problems(make):
     problem = make()
     scale = np.array([1e3, 1e3, 1.0, 1.0]) if problem.mean[1] > 1e3 else np.full(4, 1e-3)
@@ -76,7 +90,9 @@ def test_rates_and_measurements_equal_sympys(seed):
     problem, rng = driven(pz.RungeKutta4(1)), np.random.default_rng(seed)
     x, t = problem.mean + 0.2 * rng.standard_normal(5), rng.uniform(-2, 2)
     q, v, theta, damping, bias, time, k, scale = symbols = sp.symbols("q v theta damping bias t k scale", real=True)
-    f = sp.Matrix([v, -k * sp.sin(q) - damping * v + sp.cos(time * theta), sp.exp(-time) * q * damping - theta**3 / (1 + v**2), 0, 0])
+    f = sp.Matrix(
+        [v, -k * sp.sin(q) - damping * v + sp.cos(time * theta), sp.exp(-time) * q * damping - theta**3 / (1 + v**2), 0, 0]
+    )
     h = sp.Matrix([sp.atan2(sp.sin(q), bias + sp.cos(q)), v * sp.sqrt(1 + theta**2) + time * scale])
     numbers = dict(zip(symbols, [*map(sp.Float, x), sp.Float(t), sp.Float(1.7), sp.Float(0.4)], strict=True))
     here = [(problem.dynamics(x, t), f), (problem.dynamics_jacobian(x, t), f.jacobian(symbols[:5]))]
@@ -131,7 +147,9 @@ def error_after(integrator, problem_of, state, dt, exact):
 def test_error_falls_with_the_order_of_the_method(method, order):
     state, dt = np.array([2.0, 0.1, 0.05, 0.7]), 1.0
     exact = kepler.propagate(state, dt, 1.0)
-    coarse, fine = (error_after(method(s), lambda i: network(np.random.default_rng(0), integrator=i), state, dt, exact) for s in (16, 32))
+    coarse, fine = (
+        error_after(method(s), lambda i: network(np.random.default_rng(0), integrator=i), state, dt, exact) for s in (16, 32)
+    )
     assert coarse / fine == pytest.approx(2**order, rel=0.15)
 
 

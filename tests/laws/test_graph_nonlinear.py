@@ -23,30 +23,40 @@ def bearings(epochs=150, seed=5, **changes):
     return problem, pz.Tracking(tracking.row_times, values, truth=tracking.truth)
 
 
-def ranges(Q=(0.0, 0.0, 0.01, 0.01), seed=1):
+def ranges(Q=(0.0, 0.0, 0.01, 0.01), seed=1, epochs=100):
     problem = b612(Q)
-    return problem, pz.simulate(problem, np.arange(100) * 0.1, np.random.default_rng(seed))
+    return problem, pz.simulate(problem, np.arange(epochs) * 0.1, np.random.default_rng(seed))
 
 
-def radar(**changes):
+def radar(epochs=12, **changes):
     problem = spacecraft(**changes)
-    return problem, passes(problem)
+    return problem, passes(problem, epochs)
 
 
-CASES = {
-    "satellite, Q dt": lambda: bearings(),
-    "satellite, integrated Q": lambda: bearings(epochs=60, method="integral", integrator=pz.RungeKutta4(2)),
-    "b612": lambda: ranges(),
-    "b612, Q = 0": lambda: ranges(NO_NOISE),
-    "spacecraft, three stations": lambda: radar(),
-    "spacecraft, prior an hour earlier": lambda: radar(prior_time=-20.0),
-}
+def radar_before():
+    return radar(prior_time=-20.0)
 
 
-@pytest.mark.parametrize("case", CASES)
+def ranges_without_noise():
+    return ranges(NO_NOISE)
+
+
+CASES = {"satellite": bearings, "b612": ranges, "b612, Q = 0": ranges_without_noise}
+# the problem with three stations runs uncompiled in the fast tests, on few epochs: it costs most to compile
+UNCOMPILED = {"three stations": radar, "prior before the first epoch": radar_before}
+
+
+@pytest.fixture(params=CASES | UNCOMPILED)
+def case(request, monkeypatch):
+    """Problem and tracking by name."""
+    if request.param in UNCOMPILED:
+        monkeypatch.setenv("PIAZZI_JIT", "0")
+    return (CASES | UNCOMPILED)[request.param]()
+
+
 def test_window_of_one_state_and_one_iteration_is_the_filter(case):
     """At every step; several rows an epoch, missing components, correlated R and an estimated constant among the cases."""
-    problem, tracking = CASES[case]()
+    problem, tracking = case
     window = SlidingWindow(lag=1, iterations=1).estimate(problem, tracking)
     ekf = pz.ExtendedKalmanFilter().estimate(problem, tracking)
     assert window.success, window.message
@@ -56,34 +66,31 @@ def test_window_of_one_state_and_one_iteration_is_the_filter(case):
     assert_allclose(window.innovation_covariances, ekf.innovation_covariances, rtol=1e-8)
 
 
-@pytest.mark.parametrize(
-    "case", ["satellite, Q dt", "satellite, integrated Q", "b612", "b612, Q = 0", "spacecraft, three stations"]
-)
 def test_window_of_all_states_iterated_is_the_graph(case):
     """The newest state of the last window, and every state of it."""
-    problem, tracking = CASES[case]()
-    epochs = len(tracking.times)
-    window = SlidingWindow(lag=epochs, iterations=6).estimate(problem, tracking)
+    problem, tracking = case
+    window = SlidingWindow(lag=len(tracking.times), iterations=6).estimate(problem, tracking)
     graph = FactorGraph(tolerance=1e-9).estimate(problem, tracking)
     assert graph.success, graph.message
-    assert_same_estimate(window.delayed, graph, 1e-6)
-    assert_allclose(window.mean[-1], graph.mean[-1], rtol=1e-9, atol=1e-9)
+    # a prior before the first epoch is carried to it once, where the graph keeps relinearising it
+    tolerance = 1e-6 if problem.prior_time is None else 1e-3
+    assert_same_estimate(window.delayed, graph, tolerance)
+    assert (window.mean[-1] == window.delayed.mean[-1]).all()
 
 
 @pytest.mark.parametrize("start", ["ekf", "prior", "window"])
-@pytest.mark.parametrize("case", ["satellite, Q dt", "b612", "b612, Q = 0", "spacecraft, three stations"])
 def test_cost_never_rises_after_the_first_step(case, start):
-    """As a fraction of the cost; where noise is singular the cost is that on the dynamics, which a step may leave by rounding."""
-    problem, tracking = CASES[case]()
+    """Up to rounding.  Where noise is singular, what does not rise is the cost with the price of the defect."""
+    problem, tracking = case
     estimate = FactorGraph(start).estimate(problem, tracking)
     assert estimate.success, estimate.message
     costs = np.array(estimate.details["costs"])
-    if case == "satellite, Q dt":
+    if np.linalg.matrix_rank(problem.process_noise.covariance) == problem.model.n:
         assert (np.diff(costs[1:]) <= 1e-9 * costs[2:]).all(), costs
+        assert costs[-1] < costs[0]
     assert estimate.details["cost"] == costs[-1]
     assert estimate.details["defect"] <= 1e-9
     assert estimate.details["gradient_norm"] <= 1e-4
-    assert costs[-1] < costs[0]
 
 
 def test_gradient_is_zero_at_the_solution():
@@ -165,34 +172,33 @@ def any_lanes(monkeypatch):
     machine_lanes.cache_clear()
 
 
-@pytest.mark.parametrize("case", ["satellite", "satellite, irregular", "b612"])
-def test_lanes_change_nothing(case, any_lanes):
-    """One state at a time, or several to a register: also for a number of states that no register divides, and mixed substeps."""
-    if case == "b612":
-        problem, tracking = ranges()
-    else:
-        problem = satellite(pz.Taylor(max_step=1.0))
-        gaps = np.random.default_rng(0).choice([15.0, 15.0, 15.0, 8.0], 61)
-        times = np.cumsum(gaps) if "irregular" in case else np.arange(61) * 15.0
-        tracking = pz.simulate(problem, times, np.random.default_rng(5))
-    found = {}
-    for lanes in ("1", "4", "8"):
+@pytest.mark.parametrize("times", ["regular", "irregular"])
+def test_lanes_change_nothing(times, any_lanes):
+    """One state at a time or several to a register: for a number of states that none divides, and for mixed substeps."""
+    problem = satellite(pz.Taylor(max_step=1.0))
+    gaps = np.random.default_rng(0).choice([15.0, 15.0, 15.0, 8.0], 61) if times == "irregular" else np.full(61, 15.0)
+    tracking = pz.simulate(problem, np.cumsum(gaps), np.random.default_rng(5))
+    found = []
+    for lanes in ("1", ""):
         lanes_set(any_lanes, lanes)
-        found[lanes] = FactorGraph(tolerance=1e-9).estimate(problem, tracking), SlidingWindow(20).estimate(problem, tracking)
-    for lanes in ("4", "8"):
-        for one, several in zip(found["1"], found[lanes], strict=True):
-            assert_same_estimate(several, one, 1e-8)
-            size = np.abs(one.mean).max(axis=0)
-            assert (np.abs(several.mean - one.mean) / size).max() <= 1e-12
+        found.append((FactorGraph(tolerance=1e-9).estimate(problem, tracking), SlidingWindow(20).estimate(problem, tracking)))
+    for one, several in zip(*found, strict=True):
+        assert_same_estimate(several, one, 1e-8)
+        assert_relative(several, one, 1e-12)
 
 
-@pytest.mark.parametrize("case", ["satellite", "b612", "spacecraft"])
-def test_uncompiled_equals_compiled(case, monkeypatch):
-    problem, tracking = {"satellite": lambda: bearings(epochs=25), "b612": ranges, "spacecraft": radar}[case]()
-    estimators = [FactorGraph(tolerance=1e-9), FactorGraph(tolerance=1e-9, solver="information"), SlidingWindow(5, 2)]
+def assert_relative(a, b, tolerance):
+    """Means as a fraction of the largest value of each state."""
+    assert (np.abs(a.mean - b.mean) / np.abs(b.mean).max(axis=0)).max() <= tolerance
+
+
+@pytest.mark.parametrize("problem", [bearings, ranges, pytest.param(radar, marks=pytest.mark.slow)])
+def test_uncompiled_equals_compiled(problem, monkeypatch):
+    problem, tracking = problem(epochs=25)
+    estimators = [FactorGraph(tolerance=1e-9), SlidingWindow(5, 2)]
     compiled = [e.estimate(problem, tracking) for e in estimators]
     monkeypatch.setenv("PIAZZI_JIT", "0")
     for estimator, one in zip(estimators, compiled, strict=True):
         plain = estimator.estimate(problem, tracking)
         assert_same_estimate(plain, one, 1e-7)
-        assert (np.abs(plain.mean - one.mean) / np.abs(one.mean).max(axis=0)).max() <= 1e-12
+        assert_relative(plain, one, 1e-11)

@@ -60,7 +60,9 @@ class TestNetwork:
     def test_stations_at_one_epoch_commute(self, seed, update):
         problem, tracking = observed(seed)
         rng = np.random.default_rng(seed)
-        order = np.concatenate([rng.permutation(np.arange(a, b)) for a, b in zip(tracking.first_row, tracking.first_row[1:], strict=False)])
+        order = np.concatenate(
+            [rng.permutation(np.arange(a, b)) for a, b in zip(tracking.first_row, tracking.first_row[1:], strict=False)]
+        )
         permuted = pz.Tracking(tracking.row_times[order], tracking.values[order], tracking.row_stations[order])
         ekf = pz.ExtendedKalmanFilter(update)
         one, other = ekf.estimate(problem, tracking), ekf.estimate(problem, permuted)
@@ -98,7 +100,7 @@ class TestNetwork:
         early = network(np.random.default_rng(3), prior_time=first - 0.5)
         prediction = pz.predict(early, early.prior, first - 0.5, 0.5)
         carried = network(np.random.default_rng(3), prior=prediction)
-        assert_array_equal([s.noise for s in carried.stations][0], problem.stations[0].noise)
+        assert_array_equal(carried.stations[0].noise, problem.stations[0].noise)
         ekf = pz.ExtendedKalmanFilter()
         assert_same_estimate(ekf.estimate(early, tracking), ekf.estimate(carried, tracking), 1e-12)
 
@@ -150,7 +152,10 @@ print(digest.hexdigest())
 
 def test_same_seed_same_bytes():
     """In one process and in another; a different seed gives different ones."""
-    printed = {subprocess.run([sys.executable, "-c", SAME_BYTES], check=True, capture_output=True, text=True, cwd=ROOT).stdout for _ in range(2)}
+    printed = {
+        subprocess.run([sys.executable, "-c", SAME_BYTES], check=True, capture_output=True, text=True, cwd=ROOT).stdout
+        for _ in range(2)
+    }
     assert len(printed) == 1
     problem = satellite()
     a, b, c = (pz.simulate(problem, np.arange(50) * 15.0, np.random.default_rng(seed)) for seed in (7, 7, 8))

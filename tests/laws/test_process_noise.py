@@ -73,7 +73,9 @@ def test_error_of_the_integral_falls_with_the_step(integrator):
 def test_intervals_compose(seed, dt):
     """Noise of a whole interval = noise of its first part, carried through the second, + noise of the second."""
     rng = np.random.default_rng(seed)
-    parts, whole = (network(rng, process_noise=pz.ProcessNoise(np.diag([0, 0, 2.0, 1.0])), integrator=pz.RungeKutta4(s)) for s in (6, 12))
+    parts, whole = (
+        network(rng, process_noise=pz.ProcessNoise(np.diag([0, 0, 2.0, 1.0])), integrator=pz.RungeKutta4(s)) for s in (6, 12)
+    )
     first = pz.predict(parts, parts.prior, 0.0, dt)
     second = pz.predict(parts, first, dt, dt)
     both = pz.predict(whole, whole.prior, 0.0, 2 * dt)
@@ -116,7 +118,11 @@ def test_zero_noise_adds_nothing(per):
 
 def test_estimated_constants_stand_still_unless_told_otherwise():
     model = pz.Model(["x"], ["-k*x"], [pz.Sensor("s", ["x"])], {"k": "estimated"})
-    numbers = {"prior": pz.Gaussian(1.0, 1.0), "stations": pz.Station("s", "s", 1.0), "parameters": {"k": pz.Gaussian(0.5, 0.01)}}
+    numbers = {
+        "prior": pz.Gaussian(1.0, 1.0),
+        "stations": pz.Station("s", "s", 1.0),
+        "parameters": {"k": pz.Gaussian(0.5, 0.01)},
+    }
     still = pz.Problem(model, process_noise=pz.ProcessNoise(2.0, "step"), **numbers)
     assert_allclose(noise(still, 1.0), [[2.0, 0.0], [0.0, 0.0]])
     wandering = pz.Problem(model, process_noise=pz.ProcessNoise([2.0, 3.0], "step"), **numbers)

@@ -50,9 +50,13 @@ def test_satellite_on_the_founding_recording(data_dir):
     recording = np.load(data_dir / "satellite" / "slide_example.npz", allow_pickle=False)
     noise = pz.ProcessNoise(recording["Q"], "second", "scaled")
     problem = satellite(
-        prior=pz.Gaussian(recording["x0"], recording["P0"]), process_noise=noise, stations=[pz.Station("earth", "bearing", recording["R"])]
+        prior=pz.Gaussian(recording["x0"], recording["P0"]),
+        process_noise=noise,
+        stations=[pz.Station("earth", "bearing", recording["R"])],
     )
-    tracking = pz.Tracking(np.arange(len(recording["meas"])) * float(recording["dt"]), recording["meas"], truth=recording["truth"])
+    tracking = pz.Tracking(
+        np.arange(len(recording["meas"])) * float(recording["dt"]), recording["meas"], truth=recording["truth"]
+    )
     estimate = pz.ExtendedKalmanFilter().estimate(problem, tracking)
     run = satellite_oracle(problem, tracking, textbook.taylor(MU_EARTH, 15))
     assert_same_estimate(estimate, run, 1e-5, unit=sigma(estimate))
@@ -70,7 +74,13 @@ def test_b612_from_ranges(Q, update):
     tracking = pz.simulate(problem, np.arange(100) * 0.1, np.random.default_rng(0))
     estimate = pz.ExtendedKalmanFilter(update).estimate(problem, tracking)
     step = textbook.runge_kutta(lambda t, x: textbook.gravity(x, 1000.0), 10)
-    run = oracle(problem, tracking, step, lambda z: textbook.range_from([10.0, 0.0], z, problem.stations[0].noise), lambda t, dt: np.diag(Q))
+    run = oracle(
+        problem,
+        tracking,
+        step,
+        lambda z: textbook.range_from([10.0, 0.0], z, problem.stations[0].noise),
+        lambda t, dt: np.diag(Q),
+    )
     assert estimate.success, estimate.message
     assert_same_estimate(estimate, run, 1e-6, unit=sigma(estimate))
     same_innovations(estimate, run, 1e-6)

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROBLEMS = {
     "satellite, taylor": (satellite, 15.0, 1),
     "satellite, rk4": (lambda: satellite(pz.RungeKutta4(2)), 15.0, 1),
-    "b612, singular Q": (b612, 0.1, 1),
+    "b612, singular Q": (b612, 0.1, 3),
     "b612, zero Q": (lambda: b612((0.0, 0.0, 0.0, 0.0)), 0.1, 10),
 }
 

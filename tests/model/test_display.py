@@ -11,7 +11,10 @@ from piazzi.model.display import latex, sections
 MODEL = pz.Model(
     ["x", "v"],
     ["v", "-k*sin(x)"],
-    [pz.Sensor("range_rate", {"range": "sqrt((x - place)**2)", "rate": "v"}), pz.Sensor("angle", ["atan2(x, v)"], angles=["angle"])],
+    [
+        pz.Sensor("range_rate", {"range": "sqrt((x - place)**2)", "rate": "v"}),
+        pz.Sensor("angle", ["atan2(x, v)"], angles=["angle"]),
+    ],
     {"k": "fixed", "c": "estimated"},
 )
 
@@ -19,7 +22,13 @@ MODEL = pz.Model(
 def test_sections_are_derived():
     titles = [title for title, _ in sections(MODEL)]
     assert titles[:4] == ["state x", "parameters p", "dx/dt = f", "F = df/dx"]
-    assert titles[4:] == ["numbers of range_rate", "h of range_rate", "H = dh/dx of range_rate", "h of angle", "H = dh/dx of angle"]
+    assert titles[4:] == [
+        "numbers of range_rate",
+        "h of range_rate",
+        "H = dh/dx of range_rate",
+        "h of angle",
+        "H = dh/dx of angle",
+    ]
     matrices = dict(sections(MODEL))
     assert matrices["F = df/dx"].shape == (2, 3)
     assert matrices["H = dh/dx of range_rate"].shape == (2, 3)
@@ -28,7 +37,15 @@ def test_sections_are_derived():
 def test_terminal_shows_every_formula(capsys):
     MODEL.show()
     out = capsys.readouterr().out
-    for part in ("F = df/dx", "h of range_rate", "H = dh/dx of angle", "-k⋅sin(x)", "-k⋅cos(x)", "k: fixed, c: estimated", "atan2(x, v)"):
+    for part in (
+        "F = df/dx",
+        "h of range_rate",
+        "H = dh/dx of angle",
+        "-k⋅sin(x)",
+        "-k⋅cos(x)",
+        "k: fixed, c: estimated",
+        "atan2(x, v)",
+    ):
         assert part in out, part
 
 
@@ -42,7 +59,9 @@ def test_discrete_models_show_the_step(capsys):
 
 def test_long_rows_are_not_wrapped(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
-    wide = pz.Model([f"x{i}" for i in range(6)], [" + ".join(f"a{i}*x{i}**2" for i in range(6))] * 6, parameters=[f"a{i}" for i in range(6)])
+    wide = pz.Model(
+        [f"x{i}" for i in range(6)], [" + ".join(f"a{i}*x{i}**2" for i in range(6))] * 6, parameters=[f"a{i}" for i in range(6)]
+    )
     wide.show()
     rows = [line for line in capsys.readouterr().out.splitlines() if "x₀" in line or "a₀" in line]
     assert rows

@@ -44,18 +44,45 @@ BAD = {
     "covariance of another size": (prior(covariance=np.eye(3)), r"prior covariance has shape \(3, 3\); it must be \(2, 2\)"),
     "covariance of one number": (prior(covariance=2.0), r"prior covariance has shape \(\); it must be \(2, 2\)"),
     "Q of another size": ({"process_noise": np.eye(4)}, r"process noise Q has shape \(4, 4\); it must be \(2, 2\)"),
-    "R of another size": ({"stations": [pz.Station("camera", "pair", np.eye(3))]}, r"R of station 'camera' has shape \(3, 3\); it must be \(2, 2\)"),
-    "R of one number for two": ({"stations": [pz.Station("camera", "pair", 1.0)]}, r"R of station 'camera' has shape \(\); .*\(place, speed\)"),
+    "R of another size": (
+        {"stations": [pz.Station("camera", "pair", np.eye(3))]},
+        r"R of station 'camera' has shape \(3, 3\); it must be \(2, 2\)",
+    ),
+    "R of one number for two": (
+        {"stations": [pz.Station("camera", "pair", 1.0)]},
+        r"R of station 'camera' has shape \(\); .*\(place, speed\)",
+    ),
     # asymmetric and indefinite
-    "asymmetric prior": (prior(covariance=[[1, 0.5], [0.1, 1]]), r"prior covariance is not symmetric: \(x, v\) is 0.5 and \(v, x\) is 0.1"),
+    "asymmetric prior": (
+        prior(covariance=[[1, 0.5], [0.1, 1]]),
+        r"prior covariance is not symmetric: \(x, v\) is 0.5 and \(v, x\) is 0.1",
+    ),
     "indefinite prior": (prior(covariance=[[1, 2], [2, 1]]), "prior covariance must be positive semidefinite: .* -1"),
-    "negative variance": (prior(covariance=[-1, 1]), "prior covariance must be positive semidefinite: the variance of 'x' is -1"),
-    "correlated with nothing": (prior(covariance=[[0, 0.5], [0.5, 1]]), r"prior covariance must be .*\(x, v\) is 0.5 beside a zero variance"),
+    "negative variance": (
+        prior(covariance=[-1, 1]),
+        "prior covariance must be positive semidefinite: the variance of 'x' is -1",
+    ),
+    "correlated with nothing": (
+        prior(covariance=[[0, 0.5], [0.5, 1]]),
+        r"prior covariance must be .*\(x, v\) is 0.5 beside a zero variance",
+    ),
     "asymmetric Q": ({"process_noise": [[1, 0.5], [0, 1]]}, "process noise Q is not symmetric"),
-    "indefinite Q": ({"process_noise": [0.0, -1.0]}, "process noise Q must be positive semidefinite: the variance of 'v' is -1"),
-    "negative R": ({"stations": [radar(noise=-0.01)]}, "R of station 'radar' must be positive definite: the variance of 'range' is -0.01"),
-    "zero R": ({"stations": [radar(noise=0.0)]}, "R of station 'radar' must be positive definite: the variance of 'range' is 0"),
-    "singular R": ({"stations": [pz.Station("camera", "pair", np.ones((2, 2)))]}, "R of station 'camera' must be positive definite: the smallest"),
+    "indefinite Q": (
+        {"process_noise": [0.0, -1.0]},
+        "process noise Q must be positive semidefinite: the variance of 'v' is -1",
+    ),
+    "negative R": (
+        {"stations": [radar(noise=-0.01)]},
+        "R of station 'radar' must be positive definite: the variance of 'range' is -0.01",
+    ),
+    "zero R": (
+        {"stations": [radar(noise=0.0)]},
+        "R of station 'radar' must be positive definite: the variance of 'range' is 0",
+    ),
+    "singular R": (
+        {"stations": [pz.Station("camera", "pair", np.ones((2, 2)))]},
+        "R of station 'camera' must be positive definite: the smallest",
+    ),
     # NaN and infinity
     "NaN in mean": (prior(mean=[1.0, NAN]), "prior mean of 'v' is nan; it must be finite"),
     "infinite mean": (prior(mean=[INF, 1.0]), "prior mean of 'x' is inf; it must be finite"),
@@ -63,30 +90,66 @@ BAD = {
     "infinite covariance": (prior(covariance=[INF, 1]), r"prior covariance has inf at \(x, x\)"),
     "NaN in Q": ({"process_noise": [NAN, 1.0]}, r"process noise Q has nan at \(x, x\)"),
     "NaN in R": ({"stations": [radar(noise=NAN)]}, r"R of station 'radar' has nan at \(range, range\)"),
-    "NaN parameter": ({"parameters": {"k": NAN, "bias": pz.Gaussian(0, 1)}}, "parameter 'k' is nan; it must be one finite number"),
-    "NaN in a constant's belief": ({"parameters": {"k": 1.0, "bias": pz.Gaussian(NAN, 1)}}, "parameter mean of 'bias' is nan; it must be finite"),
-    "negative variance of a constant": ({"parameters": {"k": 1.0, "bias": pz.Gaussian(0, -1)}}, "parameter variance must be positive semidefinite: the variance of 'bias' is -1"),
-    "infinite number": ({"stations": [radar(numbers={"mx": INF, "h": 1.0})]}, "'mx' of station 'radar' is inf; it must be one finite number"),
+    "NaN parameter": (
+        {"parameters": {"k": NAN, "bias": pz.Gaussian(0, 1)}},
+        "parameter 'k' is nan; it must be one finite number",
+    ),
+    "NaN in a constant's belief": (
+        {"parameters": {"k": 1.0, "bias": pz.Gaussian(NAN, 1)}},
+        "parameter mean of 'bias' is nan; it must be finite",
+    ),
+    "negative variance of a constant": (
+        {"parameters": {"k": 1.0, "bias": pz.Gaussian(0, -1)}},
+        "parameter variance must be positive semidefinite: the variance of 'bias' is -1",
+    ),
+    "infinite number": (
+        {"stations": [radar(numbers={"mx": INF, "h": 1.0})]},
+        "'mx' of station 'radar' is inf; it must be one finite number",
+    ),
     "NaN prior time": ({"prior_time": NAN}, "prior_time is nan; it must be finite"),
     # not numbers at all
     "text in mean": (prior(mean=["1.0", "a"]), "prior mean is not made of real numbers"),
-    "complex covariance": (prior(covariance=np.eye(2) * 1j), "prior covariance is not made of real numbers: it has type complex128"),
+    "complex covariance": (
+        prior(covariance=np.eye(2) * 1j),
+        "prior covariance is not made of real numbers: it has type complex128",
+    ),
     "ragged matrix": (prior(covariance=[[1, 0], [1]]), "prior covariance is not made of real numbers"),
     "objects": (prior(mean=[None, 1.0]), "prior mean is not made of real numbers: it has type object"),
     "text as parameter": ({"parameters": {"k": "1.0", "bias": pz.Gaussian(0, 1)}}, "parameter 'k' is not made of real numbers"),
-    "two numbers as one": ({"parameters": {"k": [1.0, 2.0], "bias": pz.Gaussian(0, 1)}}, r"parameter 'k' is \[1.0, 2.0\]; it must be one finite"),
+    "two numbers as one": (
+        {"parameters": {"k": [1.0, 2.0], "bias": pz.Gaussian(0, 1)}},
+        r"parameter 'k' is \[1.0, 2.0\]; it must be one finite",
+    ),
     # names
-    "unknown parameter": ({"parameters": {"kk": 1.0, "k": 1.0, "bias": pz.Gaussian(0, 1)}}, "unknown parameter 'kk'; did you mean 'k'"),
+    "unknown parameter": (
+        {"parameters": {"kk": 1.0, "k": 1.0, "bias": pz.Gaussian(0, 1)}},
+        "unknown parameter 'kk'; did you mean 'k'",
+    ),
     "no value": ({"parameters": {"bias": pz.Gaussian(0, 1)}}, "parameter 'k' has no value"),
-    "a number for an estimated one": ({"parameters": {"k": 1.0, "bias": 0.0}}, r"parameter 'bias' is estimated: give Gaussian\(mean, variance\), not 0.0"),
+    "a number for an estimated one": (
+        {"parameters": {"k": 1.0, "bias": 0.0}},
+        r"parameter 'bias' is estimated: give Gaussian\(mean, variance\), not 0.0",
+    ),
     "unknown sensor": ({"stations": [radar(sensor="rnge")]}, "unknown sensor 'rnge'; did you mean 'range'"),
-    "unknown number": ({"stations": [radar(numbers={"mx": 0.0, "h": 1.0, "my": 0.0})]}, "gives 'my', which sensor 'range' does not use; known: h, mx"),
-    "missing number": ({"stations": [radar(numbers={"h": 1.0})]}, "station 'radar' gives no value for 'mx', which sensor 'range' uses"),
+    "unknown number": (
+        {"stations": [radar(numbers={"mx": 0.0, "h": 1.0, "my": 0.0})]},
+        "gives 'my', which sensor 'range' does not use; known: h, mx",
+    ),
+    "missing number": (
+        {"stations": [radar(numbers={"h": 1.0})]},
+        "station 'radar' gives no value for 'mx', which sensor 'range' uses",
+    ),
     "two of one name": ({"stations": [radar(), radar()]}, "two stations are called 'radar'"),
-    "integrator of the wrong kind": ({"integrator": pz.Discrete()}, "integrator Discrete does not fit: the model is continuous"),
+    "integrator of the wrong kind": (
+        {"integrator": pz.Discrete()},
+        "integrator Discrete does not fit: the model is continuous",
+    ),
     # singular
-    "at the centre": (prior(mean=[0.0, 1.0]), r"the dynamics of 'v' have no finite value at the prior mean \(x = 0, v = 1, bias = 0\)"),
-}  # fmt: skip
+    "at the centre": (
+        prior(mean=[0.0, 1.0]),
+        r"the dynamics of 'v' have no finite value at the prior mean \(x = 0, v = 1, bias = 0\)",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", BAD)
@@ -110,7 +173,9 @@ def test_measurement_without_a_value_at_the_prior_mean():
 
 def test_measurement_without_a_derivative_at_the_prior_mean():
     """A radar that stands where the prior says the target is: the range is zero and has no direction."""
-    with pytest.raises(ValueError, match=r"station 'radar' has no derivative at the prior mean \(x = 10, y = 0, vx = 0, vy = 9\)") as error:
+    with pytest.raises(
+        ValueError, match=r"station 'radar' has no derivative at the prior mean \(x = 10, y = 0, vx = 0, vy = 9\)"
+    ) as error:
         at_radar = b612(prior=pz.Gaussian([10.0, 0.0, 0.0, 9.0], np.eye(4)))
         pz.ExtendedKalmanFilter().estimate(at_radar, pz.Tracking([0.0, 0.1], [1.0, 1.0]))
     assert "\n" not in str(error.value)
@@ -138,7 +203,9 @@ def test_enumerations_name_their_values():
 
 
 def test_numbers_may_come_in_many_forms():
-    a = problem(prior=pz.Gaussian([1, 0], [1, 4]), stations=pz.Station("radar", "range", [[0.01]], {"mx": 0, "h": np.float32(1)}))
+    a = problem(
+        prior=pz.Gaussian([1, 0], [1, 4]), stations=pz.Station("radar", "range", [[0.01]], {"mx": 0, "h": np.float32(1)})
+    )
     b = problem(prior=pz.Gaussian(np.array([1, 0]), np.diag([1, 4])), stations=[radar()])
     assert_array_equal(a.covariance, b.covariance)
     assert_array_equal(a.station_noise, b.station_noise)

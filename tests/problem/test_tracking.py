@@ -15,14 +15,23 @@ BAD = {
     "NaN time": (lambda: pz.Tracking([0, NAN], [1, 2]), "time of row 1 is nan; it must be finite"),
     "infinite time": (lambda: pz.Tracking([0, np.inf], [1, 2]), "time of row 1 is inf; it must be finite"),
     "time runs back": (lambda: pz.Tracking([0, 2, 1], [1, 2, 3]), "times must increase: row 2 is at 1 s, after 2 s"),
-    "infinite measurement": (lambda: pz.Tracking([0, 1], [1, -np.inf]), r"measurement of row 1 \(t = 1 s\), component 0, is -inf; write NaN"),
+    "infinite measurement": (
+        lambda: pz.Tracking([0, 1], [1, -np.inf]),
+        r"measurement of row 1 \(t = 1 s\), component 0, is -inf; write NaN",
+    ),
     "too few values": (lambda: pz.Tracking([0, 1], [1]), r"measurements have shape \(1,\) for 2 times"),
     "three axes": (lambda: pz.Tracking([0], np.zeros((1, 1, 1))), "measurements have shape"),
     "text": (lambda: pz.Tracking([0], ["a"]), "measurements is not made of real numbers|measurements are not made"),
     "names of other length": (lambda: pz.Tracking([0, 1], [1, 2], ["a"]), "row_stations has 1 names for 2 rows"),
-    "truth of other length": (lambda: pz.Tracking([0, 1], [1, 2], truth=np.zeros((3, 4))), r"truth has shape \(3, 4\) for 2 epochs"),
-    "infinite truth": (lambda: pz.Tracking([0, 1], [1, 2], truth=[[0, 1], [2, np.inf]]), "truth of epoch 1, state 1, is inf; it must be finite"),
-}  # fmt: skip
+    "truth of other length": (
+        lambda: pz.Tracking([0, 1], [1, 2], truth=np.zeros((3, 4))),
+        r"truth has shape \(3, 4\) for 2 epochs",
+    ),
+    "infinite truth": (
+        lambda: pz.Tracking([0, 1], [1, 2], truth=[[0, 1], [2, np.inf]]),
+        "truth of epoch 1, state 1, is inf; it must be finite",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", BAD)

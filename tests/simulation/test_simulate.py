@@ -45,7 +45,7 @@ def linear_problem(rng, n=3, Q=None, **changes):
 
 
 @pytest.mark.parametrize("rank", [0, 1, 2, 3])
-def test_process_noise_has_covariance_Q(rank):  # noqa: N802
+def test_process_noise_has_covariance_Q(rank):
     """Per step, of any rank: a direction without noise stays without."""
     rng = np.random.default_rng(rank)
     Q = random_covariance(rng, 3, rank)
@@ -92,7 +92,7 @@ def test_noise_is_white():
     assert (np.abs(w[1:].T @ w[:-1] / len(w)) <= FIVE_SIGMA * np.sqrt(np.outer(np.diag(Q), np.diag(Q)) / len(w))).all()
 
 
-def test_measurements_have_covariance_R_and_see_the_disturbed_truth():  # noqa: N802
+def test_measurements_have_covariance_R_and_see_the_disturbed_truth():
     rng = np.random.default_rng(4)
     problem = linear_problem(rng)
     _, tracking = steps_of(problem, np.arange(2000.0), rng)
@@ -120,7 +120,9 @@ def test_first_state_is_drawn_from_the_prior():
 def test_prior_time_before_the_first_epoch_is_travelled():
     rng = np.random.default_rng(7)
     A = random_stable(rng, 2)
-    problem = linear(A, [np.ones((1, 2))], [np.eye(1)], np.zeros((2, 2)), pz.Gaussian([1.0, 2.0], np.zeros((2, 2))), prior_time=-1.0)
+    problem = linear(
+        A, [np.ones((1, 2))], [np.eye(1)], np.zeros((2, 2)), pz.Gaussian([1.0, 2.0], np.zeros((2, 2))), prior_time=-1.0
+    )
     assert_allclose(pz.simulate(problem, [0.0, 1.0], rng).truth, [A @ [1, 2], A @ A @ [1, 2]], rtol=1e-13)
 
 
@@ -159,7 +161,11 @@ def test_truth_may_have_other_parameters_integrator_and_noise():
 
 def test_truth_of_estimated_constants():
     model = pz.Model(["x"], ["c"], [pz.Sensor("s", ["x"])], {"c": "estimated"})
-    numbers = {"prior": pz.Gaussian(0.0, 0.0), "stations": pz.Station("s", "s", 1.0), "parameters": {"c": pz.Gaussian(2.0, 9.0)}}
+    numbers = {
+        "prior": pz.Gaussian(0.0, 0.0),
+        "stations": pz.Station("s", "s", 1.0),
+        "parameters": {"c": pz.Gaussian(2.0, 9.0)},
+    }
     rng = np.random.default_rng(0)
     drawn = np.array([pz.simulate(pz.Problem(model, **numbers), [0.0], rng).truth[0, 1] for _ in range(600)])
     assert_covariance(drawn[:, None] - 2.0, np.array([[9.0]]))
@@ -220,5 +226,8 @@ def test_refusals():
 
 def test_a_truth_that_falls_into_the_centre_is_refused():
     truth = pz.Truth(state=[0.0, 0.0, 0.0, 0.0], process_noise=pz.ProcessNoise(np.zeros(4), "step"))
-    with pytest.raises(ValueError, match=r"the simulated truth is not finite from epoch 1 \(t = 0.1 s\); it started at x = 0, y = 0, vx = 0, vy = 0"):
+    with pytest.raises(
+        ValueError,
+        match=r"the simulated truth is not finite from epoch 1 \(t = 0.1 s\); it started at x = 0, y = 0, vx = 0, vy = 0",
+    ):
         pz.simulate(b612(truth=truth), [0.0, 0.1, 0.2], np.random.default_rng(0))

@@ -49,10 +49,10 @@ def command(
         if output_file != output.STDOUT:
             output.print_json(comparison.to_dict())
     elif output_file != output.STDOUT:
-        from piazzi.present.tables import summary
+        from piazzi.present.tables import heading
 
         wrote = [f"Wrote {output_file}"] if output_file else []
-        output.print_rich(summary(comparison.problem, comparison.tracking, source_name), "", comparison, *wrote)
+        output.print_rich(heading(comparison.problem, comparison.tracking, source_name), "", comparison, *wrote)
     return DONE if comparison.success else NOT_ESTIMATED
 
 

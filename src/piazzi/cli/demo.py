@@ -101,10 +101,10 @@ def _kept(comparison: Comparison, folder: Path) -> list[Path]:
 def _print(comparison: Comparison, scenario: Scenario) -> None:
     from rich.text import Text
 
-    from piazzi.present.tables import summary
+    from piazzi.present.tables import heading
 
     head = Text(scenario.title, style="bold")
-    output.print_rich(head, summary(comparison.problem, comparison.tracking, scenario.name), "", comparison, "")
+    output.print_rich(head, heading(comparison.problem, comparison.tracking, scenario.name), "", comparison, "")
 
 
 def _conclude(wrote: list[Path], folder: Path) -> None:

@@ -47,7 +47,7 @@ def command(
       piazzi estimate tracking.npz --with window:100 -o orbit.nc
       piazzi estimate rows.csv --scenario b612-range --json
       piazzi simulate b612-range -o - | piazzi estimate - --scenario b612-range
-      sensor | piazzi estimate b612-range --follow - --with window:50 --checkpoint state.npz
+      sensor | piazzi estimate b612-range --follow - --checkpoint state.npz
     """
     if follow is not None:
         return _follow(source, options.parsed(names, (DEFAULT,)), output_file, as_json, follow, checkpoint)
@@ -128,9 +128,9 @@ def series(estimate: Estimate) -> dict[str, Any]:
 
 
 def _print(comparison: Comparison, source_name: str, output_file: str | None) -> None:
-    from piazzi.present.tables import state_table, summary
+    from piazzi.present.tables import heading, state_table
 
-    parts: list[Any] = [summary(comparison.problem, comparison.tracking, source_name), ""]
+    parts: list[Any] = [heading(comparison.problem, comparison.tracking, source_name), ""]
     for name, estimate in comparison.estimates.items():  # at the last epoch both views of a window are one
         parts += [state_table(name, estimate), ""]
     output.print_rich(*parts, comparison, *([f"Wrote {output_file}"] if output_file and comparison.estimates else []))

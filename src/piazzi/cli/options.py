@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -45,7 +47,7 @@ class Group(click.Group):
 
 def keep_examples(text: str | None) -> str:
     """Help text that click does not fill where examples begin."""
-    return (text or "").replace("\n\nExamples:", "\n\n\b\nExamples:")
+    return re.sub(r"\n\nExamples\n-+\n", "\n\n\b\nExamples:\n", inspect.cleandoc(text or ""))
 
 
 class WithEstimators(Command):

@@ -28,8 +28,10 @@ def print_text(text: str) -> None:
 
 
 def print_rich(*parts: Any) -> None:
-    """Tables and text on stdout: coloured on a terminal, plain and unwrapped in a pipe."""
+    """Tables and text on stdout: coloured on a terminal, plain and unwrapped in a pipe.  A plain string is never wrapped."""
     from rich.console import Console
+
+    from piazzi.evaluate.quantities import printable
 
     class Plain(Console):
         def on_broken_pipe(self) -> None:
@@ -39,7 +41,7 @@ def print_rich(*parts: Any) -> None:
     width = None if stream.isatty() or os.environ.get("COLUMNS", "").isdigit() else _UNLIMITED
     console = Plain(file=stream, width=width, highlight=False, emoji=False, markup=False)
     for part in parts:
-        console.print(part)
+        console.print(printable(part) if isinstance(part, str) else part, soft_wrap=isinstance(part, str))
 
 
 def _stdout() -> Any:

@@ -21,16 +21,16 @@ _LONGEST = 600
 def run(command: click.Command, arguments: Sequence[str] | None) -> int:
     """Call a command; returns its exit status, with every error told in one line on stderr."""
     _prepare_streams()
-    warnings.showwarning = _show_warning
     logger = logging.getLogger("piazzi.kernels")
     handler = _Lines()
     logger.addHandler(handler)
     logger.setLevel(logging.INFO)
     try:
-        status = _guarded(command, arguments)
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            return _guarded(command, arguments)
     finally:
         logger.removeHandler(handler)
-    return status
 
 
 def _guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
@@ -41,6 +41,8 @@ def _guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
                 sys.stdout.flush()
         except click.Abort as error:  # click's name for Ctrl-C, and for the end of a file
             raise error.__cause__ or KeyboardInterrupt from None
+        except SystemExit as error:  # click leaves this way from a closed pipe, and from nothing else
+            raise BrokenPipeError from error
         return status if isinstance(status, int) else DONE
     except KeyboardInterrupt:
         say("interrupted")
@@ -53,7 +55,8 @@ def _guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
             traceback.print_exc()
         status, message = _told(error)
         say(message)
-        _abandon_stdout()
+        if isinstance(error, OSError):
+            _abandon_stdout()
         return status
 
 

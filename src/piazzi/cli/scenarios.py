@@ -66,5 +66,5 @@ def check(path: str) -> int:
         say(f"{path}: {fault}")
     if faults:
         return BAD_INPUT
-    output.print_text(f"{path}: nothing wrong")
+    output.print_rich(f"{path}: nothing wrong")
     return DONE

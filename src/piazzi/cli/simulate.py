@@ -88,7 +88,7 @@ def write(path: str, problem: Problem, tracking: Tracking) -> None:
 
 
 def _print(problem: Problem, tracking: Tracking, name: str, seed: int, output_file: str | None) -> None:
-    from piazzi.present.tables import summary, truth_table
+    from piazzi.present.tables import heading, truth_table
 
     after = f"Wrote {output_file}" if output_file else "Nothing was written: -o tracking.nc keeps it."
-    output.print_rich(f"{summary(problem, tracking, name)}, seed {seed}", "", truth_table(problem, tracking), "", after)
+    output.print_rich(heading(problem, tracking, name, f", seed {seed}"), "", truth_table(problem, tracking), "", after)

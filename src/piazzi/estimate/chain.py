@@ -50,7 +50,7 @@ class Chain:
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
         J = len(inputs.z)
         self.x, self.f, self.Phi = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N))
-        self.Q_all = np.empty((K if problem.process_noise.is_integral else 1, N, N))
+        self.Q_all = np.empty((K if problem.noise_varies else 1, N, N))
         self.nu, self.H = np.empty((J, M)), np.empty((J, M, N))
         self.d_pred, self.P_pred = np.empty((K, N)), np.empty((K, N, N))
         self.multiplier, self.dx = np.zeros((K, N)), np.empty((K, N))
@@ -223,7 +223,8 @@ class InformationSolver:
     @staticmethod
     def applies(problem: Problem) -> bool:
         """Whether the prior has an inverse: a value known for certain has infinite information."""
-        return bool(np.linalg.eigvalsh(problem.covariance).min() > 0)
+        sigma = np.sqrt(np.diag(problem.covariance))
+        return bool(sigma.min() > 0 and np.linalg.eigvalsh(problem.covariance / np.outer(sigma, sigma)).min() > 1e-13)
 
     def solve(self, damping: float) -> None:
         self._solve(damping, np.empty((1, 1)), keep_cross=False)

@@ -86,7 +86,18 @@ class Estimate:
         if not finite.all():
             return self._at(int(np.argmin(finite)), "the estimate is not finite")
         sound = semidefinite(self.covariance)
-        return "" if sound.all() else self._at(int(np.argmin(sound)), "the covariance is not semidefinite")
+        if not sound.all():
+            return self._at(int(np.argmin(sound)), "the covariance is not semidefinite")
+        return self._unpredicted()
+
+    def _unpredicted(self) -> str:
+        """The first measurement that is there but has no prediction, "" if there is none."""
+        z = self.tracking.values
+        m = min(self.innovations.shape[1], z.shape[1])
+        rows = np.flatnonzero((np.isnan(self.innovations[:, :m]) & ~np.isnan(z[:, :m])).any(axis=1))
+        if not rows.size:
+            return ""
+        return f"the measurement of row {rows[0]} (t = {self.tracking.row_times[rows[0]]:g} s) has no prediction"
 
     def _at(self, k: int, what: str) -> str:
         bad = ~np.isfinite(self.mean[k])

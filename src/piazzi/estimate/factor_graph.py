@@ -19,8 +19,8 @@ from piazzi.problem.checks import Array, numeric
 
 STARTS = ("ekf", "prior", "window")
 SOLVERS = ("auto", "chain", "information")
-# predicted over noise variance of one measurement beyond which a covariance keeps less than four digits of what is left
-DIFFUSE = 1e12
+# predicted over noise variance of one measurement beyond which a covariance keeps less than six digits of what is left
+DIFFUSE = 1e10
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,32 +100,41 @@ class FactorGraph:
     def _optimize(self, chain: Chain, inputs: Inputs, tracking: Tracking) -> tuple[Outcome, Solver, str]:
         """Optimise from the start asked for; the outcome, its solver, and the starts used.
 
-        Where the prior turns out too wide for covariances, once more in information form, from the prior (a filter cannot have
-        worked); where the iterations fail, once more from a window.
+        Where the iterations fail, once more from a window, then from the prior.  Where the prior turns out too wide for
+        covariances, in information form, and from the prior first: a filter cannot have worked.
         """
-        used = self.start if isinstance(self.start, str) else "given"
-        solver: Solver = InformationSolver(chain) if self.solver == "information" else CovarianceSolver(chain)
-        first = self._run(chain, solver, self.start, inputs, tracking, self.solver == "auto")
-        if first.failure == TOO_WIDE:
-            solver, used = InformationSolver(chain), "given" if used == "given" else "prior"
-            first = self._run(chain, solver, self.start if used == "given" else "prior", inputs, tracking)
-        if not first.failure or used == "window":
-            return first, solver, used
-        second = self._run(chain, solver, "window", inputs, tracking)
-        return replace(second, iterations=first.iterations + second.iterations), solver, f"{used}, then window"
+        information, given = self.solver == "information", not isinstance(self.start, str)
+        solver: Solver = InformationSolver(chain) if information else CovarianceSolver(chain)
+        waiting, tried, iterations = [s for s in ("window", "prior") if s != self._start_name], [], 0
+        start, failure = self._start_name, ""
+        while True:
+            tried.append(start)
+            states = with_first(chain, self._begin(start, chain.problem, tracking, inputs))
+            widest = np.inf if information else DIFFUSE
+            outcome = optimize(chain, solver, states, self.max_iterations, self.tolerance, widest)
+            iterations += outcome.iterations
+            if outcome.failure == TOO_WIDE:
+                information = self.solver == "auto" and InformationSolver.applies(chain.problem)
+                if not information:
+                    return _too_wide(outcome, self.solver), solver, ", then ".join(tried)
+                solver, tried, waiting = InformationSolver(chain), [], (["given"] if given else []) + ["prior", "window"]
+            elif not outcome.failure:
+                return replace(outcome, iterations=iterations), solver, ", then ".join(tried)
+            else:
+                failure = failure or outcome.failure
+                if not waiting:
+                    return replace(outcome, iterations=iterations, failure=failure), solver, ", then ".join(tried)
+            start = waiting.pop(0)
 
-    def _run(
-        self, chain: Chain, solver: Solver, start: Any, inputs: Inputs, tracking: Tracking, narrow: bool = False
-    ) -> Outcome:
-        states = with_first(chain, self._begin(start, chain.problem, tracking, inputs))
-        check = narrow and InformationSolver.applies(chain.problem)
-        return optimize(chain, solver, states, self.max_iterations, self.tolerance, DIFFUSE if check else np.inf)
+    @property
+    def _start_name(self) -> str:
+        return self.start if isinstance(self.start, str) else "given"
 
-    def _begin(self, start: Any, problem: Problem, tracking: Tracking, inputs: Inputs) -> Array:
+    def _begin(self, start: str, problem: Problem, tracking: Tracking, inputs: Inputs) -> Array:
         """States to start from, (K, n)."""
         K, n = len(tracking.times), problem.model.n
-        if not isinstance(start, str):
-            states = numeric(start, "start")
+        if start == "given":
+            states = numeric(self.start, "start")
             if states.shape != (K, n) or not np.isfinite(states).all():
                 raise ValueError(f"start has shape {states.shape}; it must be ({K}, {n}), and finite")
             return states
@@ -135,6 +144,12 @@ class FactorGraph:
             return first.delayed.mean
         seen = inputs if start == "ekf" else replace(inputs, z=np.full_like(inputs.z, np.nan))
         return filter_run(problem, seen)[0]
+
+
+def _too_wide(outcome: Outcome, solver: str) -> Outcome:
+    """The outcome for a prior too wide for covariances where they must be used."""
+    way = "choose solver='auto'" if solver == "chain" else "a value with zero prior variance rules out the information form"
+    return replace(outcome, failure=f"{TOO_WIDE} beside the noise of the measurements: {way}")
 
 
 def with_first(chain: Chain, states: Array) -> Array:

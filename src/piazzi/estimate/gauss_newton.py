@@ -27,21 +27,24 @@ class Outcome:
 def optimize(
     chain: Chain, solver: Solver, start: Array, max_iterations: int, tolerance: float, widest: float = np.inf
 ) -> Outcome:
-    """Iterate from the states `start` until no state moves by more than `tolerance` of its standard deviations.
+    """Iterate from the states `start` until no state and no measurement moves by more than `tolerance` standard deviations.
 
+    Measurements count too because a combination of states can be known much better than each of them.
     A step that raises the merit is damped as much as it takes (Levenberg-Marquardt, scaled by the prior), except the first.
     The merit is the cost, and for directions without noise, where the dynamics must hold, twice the defect at the price of
     its multiplier (an exact penalty: Nocedal and Wright 2006, eq. 15.24).  Ends at once, with the failure `TOO_WIDE`, where
     a predicted measurement has more than `widest` times the variance of its noise.
     """
     chain.x[:] = start
+    if not np.isfinite(start).all():
+        return _without_start(chain)
     cost, damping, failure = chain.linearize(), 0.0, f"not converged after {max_iterations} iterations"
     costs, covariance, iteration = [cost], None, 0
     for iteration in range(1, max_iterations + 1):
         solver.solve(damping)
         if iteration == 1 and widest < np.inf and not chain.widest() <= widest:
-            return Outcome(chain.P_pred, iteration, TOO_WIDE, {})
-        if damping == 0.0 and chain.report[STEP] <= tolerance:
+            return Outcome(chain.P_pred, iteration, TOO_WIDE, _figures(chain, solver, costs))
+        if damping == 0.0 and max(chain.report[STEP], np.sqrt(chain.report[GRADIENT])) <= tolerance and np.isfinite(cost):
             covariance = solver.marginals()
             if chain.report[STEP_SMOOTHED] <= tolerance:
                 chain.x += chain.dx
@@ -54,7 +57,7 @@ def optimize(
             failure = "no step lowers the cost, however small"
             break
     if failure:
-        failure += _largest_step(chain)
+        failure += _weakest(chain)
         solver.solve(0.0)
     covariance = solver.marginals() if covariance is None else covariance
     return Outcome(covariance, iteration, failure, _figures(chain, solver, costs))
@@ -70,7 +73,7 @@ def _step(chain: Chain, solver: Solver, cost: float, damping: float, gated: bool
         price = np.abs(chain.multiplier)
         np.add(x, chain.dx, out=chain.x)
         new = chain.linearize()
-        merit, merit_new = cost + 2.0 * float((price * broken).sum()), new + 2.0 * float((price * chain.broken).sum())
+        merit, merit_new = _merit(cost, price, broken), _merit(new, price, chain.broken)
         if np.isfinite(merit_new) and (not gated or merit_new <= merit + 1e-9 * (1.0 + abs(merit))):
             return True, new, 0.0 if damping <= FIRST_DAMPING else damping / 10.0
         damping = max(10.0 * damping, FIRST_DAMPING)
@@ -79,6 +82,21 @@ def _step(chain: Chain, solver: Solver, cost: float, damping: float, gated: bool
         if damping > LARGEST_DAMPING:
             return False, cost, damping
         solver.solve(damping)
+
+
+def _merit(cost: float, price: Array, broken: Array) -> float:
+    """The cost, and twice the price of the defects in directions without noise."""
+    with np.errstate(all="ignore"):  # a step that is not finite has no merit
+        return cost + 2.0 * float((price * broken).sum())
+
+
+def _without_start(chain: Chain) -> Outcome:
+    """The outcome of a start that is not finite."""
+    k, i = np.argwhere(~np.isfinite(chain.x))[0]
+    chain.d_pred.fill(np.nan)
+    chain.P_pred.fill(np.nan)
+    where = f"{chain.problem.model.names[i]!r} is {chain.x[k, i]} from t = {chain.inputs.t[k]:g} s"
+    return Outcome(chain.P_pred, 0, f"the start cannot be used: {where}", {})
 
 
 def _figures(chain: Chain, solver: Solver, costs: list[float]) -> dict[str, Any]:
@@ -92,14 +110,13 @@ def _figures(chain: Chain, solver: Solver, costs: list[float]) -> dict[str, Any]
     }
 
 
-def _largest_step(chain: Chain) -> str:
-    """Where the last step was largest, in the problem's own words."""
-    names, t = chain.problem.model.names, chain.inputs.t
-    sigma = np.sqrt(np.maximum(np.diagonal(chain.P_pred, axis1=1, axis2=2), 1e-300))
-    with np.errstate(all="ignore"):
-        size = np.abs(chain.dx) / sigma
-    if not np.isfinite(size).all():
-        k, i = np.argwhere(~np.isfinite(size))[0]
-        return f": the step of {names[i]!r} is not finite at t = {t[k]:g} s"
+def _weakest(chain: Chain) -> str:
+    """Where the last step went wrong, in the problem's own words: the first value that is not finite, else the largest step."""
+    names, t, variance = chain.problem.model.names, chain.inputs.t, np.diagonal(chain.P_pred, axis1=1, axis2=2)
+    for what, values in (("prediction", chain.d_pred), ("variance", variance), ("step", chain.dx)):
+        bad = np.argwhere(~np.isfinite(values))
+        if bad.size:
+            return f": the {what} of {names[bad[0, 1]]!r} is not finite from t = {t[bad[0, 0]]:g} s"
+    size = np.abs(chain.dx) / np.sqrt(np.maximum(variance, 1e-300))
     k, i = np.unravel_index(int(np.argmax(size)), size.shape)
     return f": {names[i]!r} at t = {t[k]:g} s still moves by {size[k, i]:.2g} sigma"

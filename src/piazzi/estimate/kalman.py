@@ -22,7 +22,7 @@ Update = Literal["auto", "joint", "components"]
 def update_fragments(problem: Problem, update: Update) -> tuple[str, ...]:
     """The fragments that do the update: by components where every R is diagonal, unless told otherwise."""
     if update == "auto":
-        update = "joint" if problem.station_correlated.any() else "components"
+        update = "joint" if 1 in problem.station_correlated.tolist() else "components"
     return ("decorrelate", "update_components", "epoch") if update == "components" else ("update_joint", "epoch")
 
 
@@ -90,7 +90,7 @@ def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tup
         S,
     )
     seconds = time.perf_counter() - started
-    if not isfinite(mean[0].sum()) and inputs.t_prior == inputs.t[0]:
+    if not all(map(isfinite, mean[0].tolist())) and inputs.t_prior == inputs.t[0]:
         raise ValueError(_singular_start(problem, inputs))
     return mean, P, nu, S, seconds
 

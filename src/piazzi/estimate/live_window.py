@@ -15,6 +15,11 @@ from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
 
+def window_opens(newest: Any, lag_seconds: float) -> Any:
+    """Time from which a state is in a window of so many seconds; one that is on the edge up to rounding is in it."""
+    return newest - lag_seconds * (1 + 1e-12) - 4 * np.spacing(np.abs(newest))
+
+
 class LiveWindow:
     """A sliding window in progress, from ``SlidingWindow(...).start(problem)``.
 
@@ -187,7 +192,7 @@ class LiveWindow:
     def _leaving(self) -> int:
         if self.lag_seconds is None:
             return max(len(self._t) - self.lag, 0)
-        return int(np.searchsorted(self._t, self._t[-1] - self.lag_seconds * (1 + 1e-12)))
+        return int(np.searchsorted(self._t, window_opens(self._t[-1], self.lag_seconds)))
 
     def _drop(self, count: int) -> None:
         rows = int(self._first_row[count])
@@ -263,7 +268,7 @@ class LiveWindow:
             big, rows = 2 * W, 2 * J
             self._capacity = (big, rows)
             self._nu_lin, self._H_lin, self._dx = np.empty(rows * m), np.empty((rows * m, n)), np.empty((big, n))
-            Q_all = np.empty((big if self.problem.process_noise.is_integral else 1, n, n))
+            Q_all = np.empty((big if self.problem.noise_varies else 1, n, n))
             self._space = (
                 np.empty((big, n)),
                 np.empty((big, n, n)),

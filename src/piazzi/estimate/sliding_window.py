@@ -10,7 +10,7 @@ from piazzi import kernels
 from piazzi.estimate.chain import chain_fragments
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.inputs import Inputs, prepare
-from piazzi.estimate.live_window import LiveWindow
+from piazzi.estimate.live_window import LiveWindow, window_opens
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem, Tracking
@@ -55,7 +55,7 @@ class SlidingWindow:
         newest = np.arange(len(times), dtype=np.int64)
         if self.lag_seconds is None:
             return np.maximum(newest - (self.lag - 1), 0)
-        return np.searchsorted(times, times - self.lag_seconds * (1 + 1e-12)).astype(np.int64)
+        return np.asarray(np.searchsorted(times, window_opens(times, self.lag_seconds)), dtype=np.int64)
 
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Real-time means and covariances at every epoch, with the delayed ones beside them.
@@ -112,7 +112,7 @@ def window_space(problem: Problem, inputs: Inputs, begin: Array) -> tuple[Array,
     W = int((newest - begin).max()) + 1
     rows = int((inputs.first_row[newest + 1] - inputs.first_row[begin]).max()) * M
     in_epoch = int(np.diff(inputs.first_row).max()) * M
-    Q_all = np.empty((W if problem.process_noise.is_integral else 1, N, N))
+    Q_all = np.empty((W if problem.noise_varies else 1, N, N))
     return (
         np.empty((W, N)),
         np.empty((W, N, N)),

@@ -10,11 +10,13 @@ from math import isfinite
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from piazzi.estimate import Estimate, Estimator
 from piazzi.estimate.inputs import prepare
 from piazzi.estimate.registry import views_of
 from piazzi.evaluate.display import html, render
-from piazzi.evaluate.metrics import groups, has_diverged, nees, nis, rmse
+from piazzi.evaluate.metrics import diverged, groups, known_truth, nis, rmse, squared_in_sigmas
 from piazzi.problem import Problem, Tracking
 
 if TYPE_CHECKING:
@@ -64,8 +66,10 @@ def finite(value: float | None) -> float | None:
 def evaluate(name: str, estimate: Estimate) -> Row:
     """How good the estimate is, and whether its covariance says so."""
     last = slice(len(estimate.mean) // 2, None)
-    columns = groups(estimate)
-    consistency = nees(estimate)
+    columns, truth = groups(estimate), known_truth(estimate)
+    known = None if truth is None else ~np.isnan(truth)
+    error = None if truth is None else estimate.mean - truth
+    consistency = None if error is None or known is None else squared_in_sigmas(error, estimate.covariance, known)
     return Row(
         estimator=name,
         view=estimate.view,
@@ -73,12 +77,12 @@ def evaluate(name: str, estimate: Estimate) -> Row:
         message=estimate.message,
         iterations=int(estimate.iterations),
         seconds=estimate.seconds,
-        rmse={g: rmse(estimate, c) for g, c in columns.items()},
-        rmse_last_half={g: rmse(estimate, c, last) for g, c in columns.items()},
+        rmse={g: rmse(error, c, known=known) for g, c in columns.items()},
+        rmse_last_half={g: rmse(error, c, last, known) for g, c in columns.items()},
         mean_nees=consistency.mean() if consistency else None,
         mean_nees_last_half=consistency.mean(last) if consistency else None,
         mean_nis=nis(estimate).mean(),
-        diverged=has_diverged(estimate),
+        diverged=diverged(estimate, error, consistency),
     )
 
 

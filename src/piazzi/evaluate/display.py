@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, number, sigma_factor, unit_of
+from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, number, printable, sigma_factor, unit_of
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
@@ -45,14 +45,14 @@ def columns(comparison: Comparison) -> list[Column]:
     """Everything the table shows; columns without any value are left out."""
     rows = comparison.rows
     found = [
-        Column("estimator", "", "", tuple(r.estimator for r in rows)),
+        Column("estimator", "", "", tuple(printable(r.estimator) for r in rows)),
         Column("view", "", "", tuple(_VIEW.get(r.view, r.view) for r in rows)),
     ]
     for group in dict.fromkeys(g for r in rows for g in r.rmse):
         show = group_display(comparison, group)
         for part, values in (("whole run", [r.rmse for r in rows]), ("last half", [r.rmse_last_half for r in rows])):
             shown = (number(_times(v.get(group), show.factor)) for v in values)
-            found.append(Column(f"{group} RMSE", part, show.unit, tuple(shown)))
+            found.append(Column(f"{printable(group)} RMSE", part, printable(show.unit), tuple(shown)))
     ideal_nis = number(expected_nis(comparison), 3)
     found += [
         Column("mean NEES", "whole run", f"ideal {comparison.problem.model.n}", tuple(number(r.mean_nees, 3) for r in rows)),
@@ -165,11 +165,11 @@ def sentences(comparison: Comparison) -> list[str]:
     out = [f"{r.estimator} did not succeed: {r.message}." for r in comparison.rows if not r.success]
     wayward = dict.fromkeys(r.estimator for r in comparison.rows if r.success and r.diverged)
     out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down." for name in wayward]
-    if not sound:
-        return out
-    if not any(v is not None for r in sound for v in r.rmse.values()):
-        return [*out, *_without_truth(comparison, sound)]
-    return [*out, *_best(comparison, sound), *_honest(comparison, sound)]
+    if any(v is not None for r in sound for v in r.rmse.values()):
+        out += [*_best(comparison, sound), *_honest(comparison, sound)]
+    elif sound:
+        out += _without_truth(comparison, sound)
+    return [printable(line) for line in out]
 
 
 def _without_truth(comparison: Comparison, rows: Sequence[Row]) -> list[str]:

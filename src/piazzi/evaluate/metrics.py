@@ -12,6 +12,7 @@ from piazzi.evaluate.chi_square import quantile
 from piazzi.problem.checks import Array
 
 _CHUNK = 1 << 14  # epochs at a time: the work space stays in the processor's cache
+_DOUBTFUL = 1e-9  # pivots of correlations from here down may be rounding errors: eigenvalues decide
 _FAR = 10.0  # times the 99.9 % quantile of chi-square: no matched run comes near, however correlated in time
 
 
@@ -59,20 +60,18 @@ def known_truth(estimate: Estimate) -> Array | None:
     return out
 
 
-def rmse(estimate: Estimate, columns: Sequence[int], rows: slice = slice(None)) -> float | None:
-    """Square root of the mean over epochs of the squared length of the error in these columns, None without truth.
+def rmse(error: Array | None, columns: Sequence[int], rows: slice = slice(None), known: Array | None = None) -> float | None:
+    """Square root of the mean over epochs of the squared length of the error (K, n) in these columns, None without truth.
 
-    Epochs whose truth is not known are left out; an estimate that is not finite makes the result so.
+    `known` (K, n) marks where the truth is known, by default everywhere; epochs where it is not are left out.  An error that
+    is not finite makes the result so.
     """
-    truth = known_truth(estimate)
-    if truth is None:
+    if error is None:
         return None
-    error = (estimate.mean - truth)[rows, list(columns)]
-    return _rms(error[~np.isnan(truth[rows, list(columns)]).any(axis=1)])
-
-
-def _rms(vectors: Array) -> float | None:
-    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1)))) if len(vectors) else None
+    part = error[rows, list(columns)]
+    if known is not None and not known.all():
+        part = part[known[rows, list(columns)].all(axis=1)]
+    return float(np.sqrt(np.einsum("ki,ki->", part, part) / len(part))) if len(part) else None
 
 
 def nees(estimate: Estimate) -> Consistency | None:
@@ -114,7 +113,7 @@ def _squared_in_sigmas(e: Array, P: Array, present: Array) -> tuple[Array, Array
     finite = np.isfinite(y).all(axis=1) & np.isfinite(C).all(axis=(1, 2))
     value[~finite] = np.nan
     rank = present.sum(axis=1)
-    singular = np.flatnonzero(finite & ~(lowest > _tolerance(n)))
+    singular = np.flatnonzero(finite & ~(lowest > _DOUBTFUL))
     if singular.size:
         value[singular], found = _pseudo_inverse(y[singular], C[singular])
         rank[singular] += found - n
@@ -122,14 +121,9 @@ def _squared_in_sigmas(e: Array, P: Array, present: Array) -> tuple[Array, Array
     return value, rank
 
 
-def _tolerance(n: int) -> float:
-    """Pivots and eigenvalues of correlations at or below this are rounding errors."""
-    return 8 * n * float(np.finfo(float).eps)
-
-
 def _eliminate(y: Array, C: Array) -> tuple[Array, Array]:
     """y^T C^-1 y and the smallest pivot; epochs last, so that every operation runs over all of them."""
-    y, C = np.ascontiguousarray(y.T), np.ascontiguousarray(np.moveaxis(C, 0, -1))
+    y, C = np.array(y.T, order="C"), np.array(np.moveaxis(C, 0, -1), order="C")
     value, lowest = np.zeros(y.shape[1]), np.full(y.shape[1], np.inf)
     for j in range(len(y)):
         pivot = C[j, j]
@@ -144,7 +138,7 @@ def _eliminate(y: Array, C: Array) -> tuple[Array, Array]:
 def _pseudo_inverse(y: Array, C: Array) -> tuple[Array, Array]:
     """y^T C^+ y and the rank of C."""
     values, vectors = np.linalg.eigh(C)
-    kept = values > _tolerance(C.shape[1]) * np.maximum(values[:, -1:], 0.0)
+    kept = values > 8 * C.shape[1] * np.finfo(float).eps * np.maximum(values[:, -1:], 0.0)
     projected = np.einsum("kji,kj->ki", vectors, y)
     with np.errstate(divide="ignore", invalid="ignore"):
         terms = np.where(kept, projected**2 / np.where(kept, values, 1.0), 0.0)
@@ -164,9 +158,13 @@ def has_diverged(estimate: Estimate) -> bool:
     Without truth, NIS and the innovations take the place of NEES and the errors.  Both kinds of divergence in Fitzgerald, IEEE
     Trans. Automatic Control 16(6), 1971, are meant: errors that grow, and errors that stay far beyond their covariance.
     """
+    return diverged(estimate, errors(estimate), nees(estimate))
+
+
+def diverged(estimate: Estimate, error: Array | None, consistency: Consistency | None) -> bool:
+    """The same from the errors and the NEES of the estimate."""
     if not np.isfinite(estimate.mean).all():
         return True
-    error, consistency = errors(estimate), nees(estimate)
     if error is not None and consistency is not None:
         return _denied(consistency) and _persists(error, list(groups(estimate).values()))
     return _denied(nis(estimate)) and _persists(estimate.innovations, [(i,) for i in range(estimate.innovations.shape[1])])
@@ -190,10 +188,9 @@ def _denied(consistency: Consistency) -> bool:
 def _persists(error: Array, columns: Sequence[Sequence[int]]) -> bool:
     """Whether in no group of columns the last quarter is less than half of the quarter before; False for a run too short."""
     K = len(error)
-    sizes = []
+    sizes, known = [], ~np.isnan(error)
     for group in columns:
-        part = error[:, list(group)]
-        earlier, later = (_rms(q[~np.isnan(q).any(axis=1)]) for q in (part[K // 2 : 3 * K // 4], part[3 * K // 4 :]))
+        earlier, later = (rmse(error, group, rows, known) for rows in (slice(K // 2, 3 * K // 4), slice(3 * K // 4, None)))
         if earlier is not None and later is not None:
             sizes.append((earlier, later))
     return bool(sizes) and all(later >= 0.5 * earlier for earlier, later in sizes)

@@ -46,10 +46,10 @@ def number(value: float | None, digits: int = 4) -> str:
         return str(value)
     if value == 0:
         return "0"
-    rounded = float(f"{value:.{digits - 1}e}")
-    exponent = floor(log10(abs(rounded)))
+    scientific = f"{value:.{digits - 1}e}"
+    rounded, exponent = float(scientific), int(scientific.partition("e")[2])
     if not -4 <= exponent < max(digits, 6):
-        return f"{value:.{digits - 1}e}"
+        return scientific
     return f"{rounded:.{max(digits - 1 - exponent, 0)}f}"
 
 
@@ -74,6 +74,11 @@ def duration(seconds: float | None) -> str:
         if seconds * factor >= 1:
             return f"{number(seconds * factor, 3)} {unit}"
     return f"{number(seconds * 1e6, 3)} us" if seconds > 0 else "0 s"
+
+
+def printable(text: str) -> str:
+    """Text of a user's file without what would steer a terminal: control characters are written out."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def unit_of(units: Iterable[str]) -> str:

@@ -55,7 +55,8 @@ def _check_symbols(expr: object) -> None:
 def _write(expr: Any) -> tuple[str, int]:
     """Return the text of an expression and how tightly it holds together."""
     if isinstance(expr, numbers.Real) and not isinstance(expr, bool):
-        return _signed(*_number(expr), PRODUCT if "/" in _number(expr)[1] else ATOM)
+        negative, text = _number(expr)
+        return _signed(negative, text, PRODUCT if "/" in text else ATOM)
     import sympy as sp
 
     if not isinstance(expr, sp.Expr):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tokenize
 import warnings
 import zipfile
 import zlib
@@ -19,7 +20,8 @@ from piazzi.problem.checks import Array
 FREE_BYTES = 64 * 2**20
 EXPANSION = 20
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError, OverflowError, MemoryError)
+_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, NotImplementedError, OverflowError, MemoryError)
+_NO_HEADER = (ValueError, TypeError, SyntaxError, RecursionError, KeyError, tokenize.TokenError)
 
 
 def read_arrays(path: str | os.PathLike[str], keys: Sequence[str], required: Collection[str]) -> dict[str, Array]:
@@ -83,7 +85,7 @@ def _header(stream: IO[bytes], key: str) -> tuple[np.dtype[Any], tuple[int, ...]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # files written by Python 2 are fine
             shape, _, dtype = _HEADERS[version](stream)
-    except (ValueError, TypeError, SyntaxError, RecursionError, KeyError) as error:
+    except _NO_HEADER as error:
         raise ValueError(f"key {key!r} is not an array: {_one_line(error)}") from None
     if any(s < 0 for s in shape):
         raise ValueError(f"key {key!r} declares shape {str(shape)[:60]}")

@@ -51,10 +51,13 @@ def read_cells(path: str | os.PathLike[str]) -> Cells:
         Where it is no table of numbers: with the line, the column and the cell.
     """
     with open(path, "rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > MAX_BYTES:
+            raise ValueError(f"it has {size:,} bytes; at most {MAX_BYTES:,} are read")
         content = file.read(2**16)
         if b"\0" in content:
             raise ValueError("it is not text: it has zero bytes")
-        content += file.read(MAX_BYTES - len(content))
+        content += file.read()
     rest = content.removeprefix(b"\xef\xbb\xbf")
     rest = rest.replace(b"\r\n", b"\n") if b"\r" in rest else rest
     comments: list[str] = []
@@ -67,7 +70,8 @@ def read_cells(path: str | os.PathLike[str]) -> Cells:
         elif first.strip():
             header = parse_header(first, line)
             rest = rest.rstrip(b"\n")
-            return fast(rest, line + 1, header, tuple(comments)) or parse_rows(rest, line + 1, header, tuple(comments))
+            table = (rest, line + 1, header, tuple(comments))
+            return (fast(*table) if len(rest) >= SMALL else None) or parse_rows(*table)
     raise ValueError("the file is empty: no line names its columns")
 
 
@@ -98,7 +102,7 @@ def parse_header(first: bytes, line: int) -> list[str]:
 
 def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -> Cells | None:
     """The table where every line is one regular row of plain cells, else None."""
-    if len(body) < SMALL or any(odd in body for odd in _ODD) or not _is_regular(body, len(header)):
+    if any(odd in body for odd in _ODD) or not _is_regular(body, len(header)):
         return None
     import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 

@@ -95,10 +95,10 @@ def text(group: Any, name: str, default: str | None = None) -> str:
 
 
 def number(group: Any, name: str) -> float:
-    """An attribute that is one number."""
+    """An attribute that is one finite number."""
     value = np.asarray(_attribute(group, name, None))
-    if value.size != 1 or value.dtype.kind not in "iuf":
-        raise ValueError(f"attribute {name!r} is not a number")
+    if value.size != 1 or value.dtype.kind not in "iuf" or not np.isfinite(value).all():
+        raise ValueError(f"attribute {name!r} is not a finite number")
     return float(value.reshape(-1)[0])
 
 

@@ -106,7 +106,7 @@ def write_npz(path: str | os.PathLike[str], problem: Problem, tracking: Tracking
     if reason:
         raise ValueError(f"{os.fspath(path)}: the .npz layout cannot hold this: {reason}; .nc can")
     arrays = {
-        "R": problem.stations[0].noise[0, 0], "Q": problem.process_noise.covariance, "dt": _step(tracking.times),
+        "R": problem.stations[0].noise[0, 0], "Q": problem.process_noise.covariance, "dt": _step(problem, tracking.times),
         "meas": tracking.values[:, 0], "x0": problem.prior.mean, "P0": problem.prior.covariance,
     }  # fmt: skip
     write_arrays(path, arrays if tracking.truth is None else {**arrays, "truth": tracking.truth})
@@ -118,20 +118,18 @@ def write_arrays(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> Non
         np.savez(file, allow_pickle=False, **{key: np.asarray(value) for key, value in arrays.items()})
 
 
-def _step(times: Array) -> float | None:
+def _step(problem: Problem, times: Array) -> float | None:
     """The number dt for which the epochs are k dt exactly, None where there is none."""
-    K = len(times)
-    guess = float(times[-1]) / max(K - 1, 1) if K > 1 else 1.0
-    for dt in (guess, np.nextafter(guess, 0.0), np.nextafter(guess, np.inf), float(times[1]) if K > 1 else 1.0):
-        if dt > 0 and np.array_equal(np.arange(K) * dt, times):
-            return float(dt)
-    return None
+    if len(times) == 1:  # any number will do that makes as many substeps
+        return float(getattr(problem.integrator, "substeps", None) or 1) if times[0] == 0 else None
+    dt = float(times[1])
+    return dt if np.array_equal(np.arange(len(times)) * dt, times) else None
 
 
 def _misfit(problem: Problem, tracking: Tracking) -> str:
     """What the founding layout has no place for, "" where it has one for everything."""
     base = load_scenario(BASE).problem
-    noise, dt = problem.process_noise, _step(tracking.times)
+    noise, dt = problem.process_noise, _step(problem, tracking.times)
     faults = {
         f"its model is not that of {BASE}": problem.model != base.model or problem.parameters != base.parameters,
         "it has other than one station": len(problem.stations) != 1,

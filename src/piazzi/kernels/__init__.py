@@ -1,7 +1,36 @@
 """Equations become compiled code."""
 
 from piazzi.kernels.cache import build_seconds, load
-from piazzi.kernels.integrators import Discrete, Integrator, RungeKutta4, Taylor
+from piazzi.kernels.integrators import Discrete, DormandPrince, Integrator, Kepler, Taylor
+from piazzi.kernels.runge_kutta import (
+    DormandPrince5,
+    Euler,
+    ExplicitRungeKutta,
+    Heun,
+    Midpoint,
+    Ralston,
+    RungeKutta,
+    RungeKutta4,
+    RungeKutta8,
+)
 from piazzi.kernels.spec import KernelSpec
 
-__all__ = ["Discrete", "Integrator", "KernelSpec", "RungeKutta4", "Taylor", "build_seconds", "load"]
+__all__ = [
+    "Discrete",
+    "DormandPrince",
+    "DormandPrince5",
+    "Euler",
+    "ExplicitRungeKutta",
+    "Heun",
+    "Integrator",
+    "Kepler",
+    "KernelSpec",
+    "Midpoint",
+    "Ralston",
+    "RungeKutta",
+    "RungeKutta4",
+    "RungeKutta8",
+    "Taylor",
+    "build_seconds",
+    "load",
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import logging
@@ -118,8 +119,6 @@ def _move(work: Path, home: Path) -> None:
             if _read(home) is not None:
                 return
             aside = Path(tempfile.mkdtemp(prefix=".damaged-", dir=home.parent))
-            try:
+            with contextlib.suppress(OSError):
                 os.rename(home, aside / "old")
-            except OSError:
-                pass
             shutil.rmtree(aside, ignore_errors=True)

@@ -39,6 +39,11 @@ def inline(function: Callable[..., Any]) -> Any:
     return njit(forceinline=True, **OPTIONS)(function)
 
 
+def outlined(function: Callable[..., Any]) -> Any:
+    """Mark a helper that is large and called from several places: it is compiled once and called."""
+    return njit(**OPTIONS)(function)
+
+
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls, with C's calling convention; its annotations are its types."""
     kinds = [k for name, k in function.__annotations__.items() if name != "return"]

@@ -14,7 +14,10 @@ from pathlib import Path
 
 @cache
 def private_folder() -> tuple[Path | None, str]:
-    """The folder of finished kernels, or None and why there is none: PIAZZI_CACHE, else XDG_CACHE_HOME/piazzi, else ~/.cache/piazzi."""
+    """The folder of finished kernels, or None and why there is none.
+
+    It is PIAZZI_CACHE, else XDG_CACHE_HOME/piazzi, else ~/.cache/piazzi.
+    """
     try:
         named = os.environ.get("PIAZZI_CACHE")
         place = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "piazzi"

@@ -4,6 +4,7 @@ Sizes: `ND` states, `N` values with the estimated constants, `M` components of t
 
 * ``dynamics(t, x, p)``, ``rhs(t, x, R, p)``: dx/dt, and with it dR/dt = F R for the first `ND` rows of a transition matrix
 * ``substep(t, h, x, p)``, ``substep_jacobian(t, h, x, R, p)``: one step of the integrator; with its derivative times R
+* ``trial(t, h, x, p)``, ``orbit_axes(x)``: a step with its error; the directions of the orbit (see `steps`)
 * ``remember(x)``, ``first_rows()``: the state at the start of a step, and its derivative; ``identity_rows()``
 * ``complete(R)``: R with the constants' rows below it
 * ``measure_into(sensor, t, x, p, s, at, out, row)``: h
@@ -16,6 +17,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from piazzi.kernels.printer import function
+from piazzi.kernels.steps import adaptive_source, axes_source, kepler_source, runge_kutta_source
+from piazzi.kernels.steps import inline_source as _inline
 from piazzi.model import Model
 from piazzi.model.derivation import constant_acceleration_step, derive, derive_sensor, jacobian
 
@@ -30,9 +33,10 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
         "ND": len(model.moving),
         "N": model.n,
         "M": model.width,
-        "NUMBERS": max([len(model.numbers(s)) for s in model.sensors] + [1]),
+        "NUMBERS": model.most_numbers,
+        "GIVEN": max(len(model.given), 1),
     }
-    parts = ["".join(f"{k} = {v}\n" for k, v in sizes.items()), "\n\n", _identity_source(model)]
+    parts = ["".join(f"{k} = {v}\n" for k, v in sizes.items()), "\n\n", _identity_source(model), axes_source(model)]
     if not model.discrete:
         parts.append(_dynamics_source(model))
     parts.append(_step_source(model, scheme))
@@ -47,10 +51,6 @@ def _arguments(model: Model, extra: Sequence[str] = ()) -> tuple[list[str], dict
     arguments = ["t", *extra, *(f"x{i}" for i in range(len(d.x))), *(f"p{i}" for i in range(len(d.p)))]
     call = ", ".join(["t", *extra, *(f"x[{i}]" for i in range(len(d.x))), *(f"p[{i}]" for i in range(len(d.p)))])
     return arguments, names, call
-
-
-def _inline(head: str, *lines: str) -> str:
-    return f"@inline\ndef {head}:\n" + "".join(f"    {line}\n" for line in lines) + "\n\n"
 
 
 def _identity_source(model: Model) -> str:
@@ -124,7 +124,11 @@ def _dynamics_source(model: Model) -> str:
 
 def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
     if scheme[0] == "runge-kutta":
-        return _runge_kutta_source(*scheme[1])
+        return runge_kutta_source(*scheme[1])
+    if scheme[0] == "adaptive":
+        return adaptive_source(model, *scheme[1:])
+    if scheme[0] == "kepler":
+        return kepler_source(model, *scheme[1:])
     if scheme[0] == "taylor":
         nxt, h = constant_acceleration_step(model)
     else:
@@ -153,23 +157,6 @@ def _map_source(model: Model, nxt: Sequence[sp.Expr], h: sp.Symbol) -> str:
             f"return {whole}, matrix({rows})",
         )
     )
-
-
-def _runge_kutta_source(a: Sequence[Sequence[float]], weights: Sequence[float], nodes: Sequence[float]) -> str:
-    """The stages of an explicit tableau, on the state alone and on state and transition matrix together."""
-
-    def stage(base: str, k: str, coefficients: Sequence[float]) -> str:
-        terms = [f"({c!r}*h)*{k}{j}" for j, c in enumerate(coefficients) if c]
-        return " + ".join([base, *terms])
-
-    alone, both = [], []
-    for i, (row, c) in enumerate(zip(a, nodes, strict=True)):
-        t = f"t + {c!r}*h" if c else "t"
-        alone.append(f"k{i} = dynamics({t}, {stage('x', 'k', row)}, p)")
-        both.append(f"k{i}, K{i} = rhs({t}, {stage('x', 'k', row)}, {stage('R', 'K', row)}, p)")
-    alone.append(f"return {stage('x', 'k', weights)}")
-    both.append(f"return {stage('x', 'k', weights)}, {stage('R', 'K', weights)}")
-    return _inline("substep(t, h, x, p)", *alone) + _inline("substep_jacobian(t, h, x, R, p)", *both)
 
 
 def _sensor_source(model: Model) -> str:

@@ -25,6 +25,11 @@ def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
+def outlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Mark a helper that is large and called from several places."""
+    return function
+
+
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     """Mark a function that Python calls."""
     return function

@@ -46,6 +46,13 @@ class _Writer:
         self.depths[symbol] = self.depth(value)
         self.names[symbol] = name
 
+    def is_late_product(self, e: sp.Expr) -> bool:
+        """Whether `e` is one slow factor times quick ones: better multiplied anew where it is used, the slow factor last."""
+        if not e.is_Mul:
+            return False
+        *quick, slow = sorted(map(self.depth, e.args))
+        return bool(slow > _SLOW and max(quick) + len(quick) <= _SLOW)
+
     def depth(self, e: sp.Expr) -> int:
         """Roughly how many operations come before the value of `e` is known."""
         if not e.args:
@@ -108,7 +115,7 @@ class _Writer:
         factors = [self.temporary(f"sqrt({b})")] if half else []
         if whole:
             factors.append(self._integer_power(b if whole > 0 else self.temporary(f"1.0/{b}"), abs(whole)))
-        return "*".join(factors)
+        return factors[0] if len(factors) == 1 else self.temporary("*".join(factors))
 
     def _integer_power(self, b: str, k: int) -> str:
         """b^k by repeated squaring."""
@@ -153,8 +160,14 @@ def function(name: str, arguments: Sequence[str], names: Mapping[sp.Symbol, str]
 
     shared, reduced = sp.cse(list(outputs), symbols=sp.numbered_symbols("c", cls=sp.Dummy))
     writer = _Writer(names)
+    spread: dict[sp.Expr, sp.Expr] = {}
     for i, (temporary, value) in enumerate(shared):
-        writer.name(temporary, f"c{i}", value)
+        whole = value.xreplace(spread)
+        if writer.is_late_product(whole):
+            spread[temporary] = whole
+        else:
+            writer.name(temporary, f"c{i}", whole)
+    reduced = [e.xreplace(spread) for e in reduced]
     results = [writer.text(e) for e in reduced]
     body = [*writer.lines, f"return ({', '.join(results)},)"]
     return f"@inline\ndef {name}({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in body) + "\n\n"

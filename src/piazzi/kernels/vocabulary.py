@@ -14,6 +14,8 @@ N: int
 M: int
 NUMBERS: int
 LANES: int
+GIVEN: int
+MAX_STEPS: int
 
 
 # written by generate.py
@@ -21,13 +23,23 @@ dynamics: Any
 rhs: Any
 substep: Any
 substep_jacobian: Any
+trial: Any
+orbit_axes: Any
 first_rows: Any
 identity_rows: Any
 remember: Any
 complete: Any
 measure_into: Any
 innovate: Any
-# written in fragments/noise_*.py, update_*.py, transition.py
+# written in fragments/coast_*.py, noise_*.py, axes*.py, transition*.py, update_*.py
+coast: Any
+coast_jacobian: Any
+coast_noise: Any
+noise_in_axes: Any
+resized: Any
+manoeuvre: Any
+happens: Any
+share: Any
 travel: Any
 transition: Any
 advance: Any

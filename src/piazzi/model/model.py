@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import cached_property
 from typing import Any
@@ -132,6 +132,17 @@ class Model:
             if STEP in sensor.free_names:
                 raise ValueError(f"sensor {sensor.name!r} uses {STEP!r}, the length of a step, which no measurement has")
 
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(tuple(getattr(self, f.name) for f in fields(self)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: what is remembered beside them, such as the hash, holds for one process."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
@@ -186,6 +197,11 @@ class Model:
     def numbers(self, sensor: Sensor) -> tuple[str, ...]:
         """Names of the numbers that a station with this sensor must give, in alphabetical order."""
         return self._numbers[sensor.name]
+
+    @cached_property
+    def most_numbers(self) -> int:
+        """Numbers of the station that must give the most, at least 1."""
+        return max([len(names) for names in self._numbers.values()] + [1])
 
     @cached_property
     def _numbers(self) -> dict[str, tuple[str, ...]]:

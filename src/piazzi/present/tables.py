@@ -8,8 +8,15 @@ import numpy as np
 
 from piazzi.estimate import Estimate
 from piazzi.evaluate.metrics import errors
-from piazzi.evaluate.quantities import display_of, duration, number, with_sigma
+from piazzi.evaluate.quantities import display_of, duration, number, printable, with_sigma
 from piazzi.problem import Problem, Tracking
+
+
+def heading(problem: Problem, tracking: Tracking, source: str, remark: str = "") -> Any:
+    """The summary as rich text."""
+    from rich.text import Text
+
+    return Text(summary(problem, tracking, source) + remark)
 
 
 def summary(problem: Problem, tracking: Tracking, source: str) -> str:
@@ -24,7 +31,7 @@ def summary(problem: Problem, tracking: Tracking, source: str) -> str:
         *([f"{missing:,} missing"] if missing else []),
         "truth known" if tracking.truth is not None else "truth not known",
     ]
-    return ", ".join(parts)
+    return printable(", ".join(parts))
 
 
 def _count(many: int, what: str) -> str:
@@ -54,8 +61,8 @@ def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
         if error is not None:
             e = float(error[k, i]) * show.factor
             texts.append(with_sigma(e, sigma * show.factor)[0] if np.isfinite(e) else "-")
-        table.add_row(Text(state), *texts, Text(show.unit))
-    return Group(Text(title, style="bold"), table)
+        table.add_row(Text(state), *texts, Text(printable(show.unit)))
+    return Group(Text(printable(title), style="bold"), table)
 
 
 def truth_table(problem: Problem, tracking: Tracking) -> Any:
@@ -73,5 +80,5 @@ def truth_table(problem: Problem, tracking: Tracking) -> Any:
         for i, state in enumerate(problem.model.names[: tracking.truth.shape[1]]):
             ends = [float(tracking.truth[0, i]), float(tracking.truth[-1, i])]
             show = display_of(problem.model.unit(state), ends)
-            table.add_row(Text(state), *(number(v * show.factor, 6) for v in ends), Text(show.unit))
+            table.add_row(Text(state), *(number(v * show.factor, 6) for v in ends), Text(printable(show.unit)))
     return table

@@ -1,7 +1,7 @@
 """Numbers: a model with values, and measurements of it."""
 
-from piazzi.problem.parts import Gaussian, ProcessNoise, Station, Truth
+from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
 from piazzi.problem.problem import Problem
 from piazzi.problem.tracking import Tracking
 
-__all__ = ["Gaussian", "Problem", "ProcessNoise", "Station", "Tracking", "Truth"]
+__all__ = ["Gaussian", "Manoeuvre", "Problem", "ProcessNoise", "Station", "Tracking", "Truth"]

@@ -21,7 +21,10 @@ def _states(problem: Problem, x: Any, t: Any) -> tuple[Array, Array, bool]:
     if out.ndim not in (1, 2) or out.shape[-1] != n:
         raise ValueError(f"state has shape {out.shape}; it must be ({n},) or (K, {n}) ({', '.join(problem.model.names)})")
     many = np.atleast_2d(out)
-    times = np.ascontiguousarray(np.broadcast_to(numeric(t, "time"), (len(many),)))
+    times = numeric(t, "time")
+    if times.size not in (1, len(many)):
+        raise ValueError(f"time has shape {times.shape}; it must be one number or ({len(many)},), one for each state")
+    times = np.ascontiguousarray(np.broadcast_to(times.reshape(-1), (len(many),)))
     return many, times, out.ndim == 1
 
 

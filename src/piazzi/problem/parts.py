@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -38,16 +38,21 @@ class ProcessNoise:
     per : "second" (a spectral density, unit^2/s) or "step" (added once per interval, whatever its length)
     method : "integral" or "scaled"
         How a density becomes the covariance Q of one interval: the integral of Phi Q Phi^T over it, or Q dt.
+    axes : "states" or "orbit"
+        With "orbit", the entries of the groups position and velocity are along the radius, transverse (towards the motion)
+        and, in three dimensions, along the orbit's normal, wherever the state is: along the way for an integral, at the end
+        of the interval otherwise.
     """
 
     covariance: Any
     per: Literal["second", "step"] = "second"
     method: Literal["integral", "scaled"] = "integral"
+    axes: Literal["states", "orbit"] = "states"
 
     def __post_init__(self) -> None:
-        for what, value, valid in (("per", self.per, ("second", "step")), ("method", self.method, ("integral", "scaled"))):
-            if value not in valid:
-                raise ValueError(f"process noise: {what} is {value!r}; it must be one of {', '.join(valid)}")
+        for what, valid in (("per", ("second", "step")), ("method", ("integral", "scaled")), ("axes", ("states", "orbit"))):
+            if getattr(self, what) not in valid:
+                raise ValueError(f"process noise: {what} is {getattr(self, what)!r}; it must be one of {', '.join(valid)}")
 
     @property
     def is_integral(self) -> bool:
@@ -55,7 +60,7 @@ class ProcessNoise:
 
     def scale(self, intervals: Array) -> Array:
         """Factor of the matrix in each interval."""
-        return np.ones(len(intervals)) if self.per == "step" else np.array(intervals, dtype=float)
+        return np.ones(len(intervals)) if self.per == "step" else intervals
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +74,28 @@ class Station:
     sensor: str
     noise: Any
     numbers: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Manoeuvre:
+    """A sudden change of the state: what was commanded, and how far the engine may have been off.
+
+    Parameters
+    ----------
+    time : float
+        Seconds, after the prior.  A manoeuvre at the time of a measurement happened just before it.
+    delta_v : (d,)
+        Added to the velocity.
+    covariance : (d, d), or its diagonal (d,); semidefinite; default zero
+        Of the error of `delta_v`.
+    states : name of a group of the model, or names of states
+        What jumps; default the group "velocity".
+    """
+
+    time: float
+    delta_v: Any
+    covariance: Any = None
+    states: str | Sequence[str] = "velocity"
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +114,8 @@ class Truth:
         None: the same.
     measurement_noise : bool
         False gives noiseless measurements.
+    manoeuvres : sequence of Manoeuvre, or None
+        None: the same, each with an error drawn from its covariance.
     """
 
     state: Any = None
@@ -94,3 +123,4 @@ class Truth:
     process_noise: ProcessNoise | None = None
     integrator: Integrator | None = None
     measurement_noise: bool = True
+    manoeuvres: Sequence[Manoeuvre] | None = None

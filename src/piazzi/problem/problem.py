@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
 from typing import Any
@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from piazzi.expressions.errors import suggest
-from piazzi.kernels import Discrete, Integrator, KernelSpec, RungeKutta4
+from piazzi.kernels import Discrete, Integrator, Kepler, KernelSpec, RungeKutta4
 from piazzi.model import Model, nearest
-from piazzi.problem import functions
+from piazzi.problem import functions, manoeuvres
 from piazzi.problem.checks import Array, covariance, finite_vector, frozen, numeric
-from piazzi.problem.parts import Gaussian, ProcessNoise, Station, Truth
+from piazzi.problem.composition import composed
+from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
+from piazzi.problem.two_body import check_orbit_axes, check_two_body
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,8 @@ class Problem:
     truth : Truth, optional
         What simulation does differently.
     name : str
+    manoeuvres : sequence of Manoeuvre
+        Sudden changes of the state, applied by every estimator and in simulation.
 
     Raises
     ------
@@ -54,17 +58,22 @@ class Problem:
     prior_time: float | None = None
     truth: Truth | None = None
     name: str = ""
+    manoeuvres: Sequence[Manoeuvre] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "process_noise", self._noise(self.process_noise))
         put(self, "stations", self._stations())
         put(self, "parameters", self._parameters())
+        put(self, "manoeuvres", manoeuvres.checked(self.manoeuvres, self.model))
         put(self, "integrator", self._integrator())
         if self.prior_time is not None and not isfinite(self.prior_time):
             raise ValueError(f"prior_time is {self.prior_time}; it must be finite")
         put(self, "prior", self._prior())
         self._check_regular()
+        self._lay_out()
+        if isinstance(self.integrator, Kepler):
+            check_two_body(self, self.integrator)
 
     # ---- checks --------------------------------------------------------------------------------------------------
 
@@ -77,12 +86,14 @@ class Problem:
         states, names = self.model.states, self.model.names
         noise = given if isinstance(given, ProcessNoise) else ProcessNoise(np.zeros(len(states)) if given is None else given)
         if self.model.discrete and noise.is_integral:
-            noise = ProcessNoise(noise.covariance, "second" if given is None else noise.per, "scaled")
+            noise = replace(noise, per="second" if given is None else noise.per, method="scaled")
         whole = np.shape(noise.covariance)[:1] == (len(names),) and len(names) > len(states)
         matrix = covariance(noise.covariance, len(names if whole else states), "process noise Q", names if whole else states)
         full = np.zeros((len(names), len(names)))
         full[: len(matrix), : len(matrix)] = matrix
-        return ProcessNoise(frozen(full), noise.per, noise.method)
+        if noise.axes == "orbit":
+            check_orbit_axes(self.model)
+        return replace(noise, covariance=frozen(full))
 
     def _stations(self) -> tuple[Station, ...]:
         out: list[Station] = []
@@ -145,15 +156,26 @@ class Problem:
 
     # ---- what kernels are given ----------------------------------------------------------------------------------
 
+    def _lay_out(self) -> None:
+        """Make the arrays now, so that no run has to."""
+        for name in ("mean", "covariance", "given"):
+            getattr(self, name)
+        for name in ("sensor", "noise", "correlated", "numbers"):
+            getattr(self, f"station_{name}")
+
     @cached_property
     def mean(self) -> Array:
         """Prior mean of everything estimated, (n,)."""
+        if self.model.names == self.model.states:
+            return self.prior.mean  # type: ignore[no-any-return]
         moving = self.prior.mean[list(self.model.sources)]
         return frozen([*moving, *(self.parameters[c].mean[0] for c in self.model.constants)])
 
     @cached_property
     def covariance(self) -> Array:
         """Prior covariance of everything estimated, (n, n)."""
+        if self.model.names == self.model.states:
+            return self.prior.covariance  # type: ignore[no-any-return]
         out = np.zeros((self.model.n, self.model.n))
         sources, nd = list(self.model.sources), len(self.model.moving)
         out[:nd, :nd] = self.prior.covariance[np.ix_(sources, sources)]
@@ -163,9 +185,10 @@ class Problem:
 
     @cached_property
     def given(self) -> Array:
-        """Values of the parameters that are not estimated, at least one number long."""
+        """Values of the parameters that are not estimated, at least one number long; behind them the manoeuvres, if any."""
         values = [self.parameters[name] for name in self.model.given]
-        return frozen([v.mean[0] if isinstance(v, Gaussian) else v for v in values] or [0.0])
+        numbers = [v.mean[0] if isinstance(v, Gaussian) else v for v in values] or [0.0]
+        return frozen([*numbers, *manoeuvres.packed(self.manoeuvres, self.model)] if self.manoeuvres else numbers)
 
     @cached_property
     def station_sensor(self) -> Array:
@@ -176,34 +199,45 @@ class Problem:
     @cached_property
     def station_noise(self) -> Array:
         """R of each station, (S, M, M), unit variance where a sensor has fewer components."""
-        out = np.tile(np.eye(self.model.width), (len(self.stations), 1, 1))
+        M = self.model.width
+        out = np.zeros((len(self.stations), M, M))
         for s, station in enumerate(self.stations):
             m = len(station.noise)
             out[s, :m, :m] = station.noise
-        return frozen(out)
+            for i in range(m, M):
+                out[s, i, i] = 1.0
+        out.setflags(write=False)
+        return out
 
     @cached_property
     def station_correlated(self) -> Array:
         """For each station, 1 where its R is not diagonal, (S,)."""
-        return np.array([int(np.count_nonzero(R - np.diag(np.diag(R)))) > 0 for R in self.station_noise], dtype=np.int64)
+        return np.array([not _is_diagonal(s.noise) for s in self.stations], dtype=np.int64)
 
     @cached_property
     def station_numbers(self) -> Array:
         """Each station's own numbers in alphabetical order, (S, widest)."""
-        width = max([len(self.model.numbers(s)) for s in self.model.sensors] + [1])
-        out = np.zeros((len(self.stations), width))
+        out = np.zeros((len(self.stations), self.model.most_numbers))
         for s, station in enumerate(self.stations):
-            out[s, : len(station.numbers)] = list(station.numbers.values())
-        return frozen(out)
+            if station.numbers:
+                out[s, : len(station.numbers)] = list(station.numbers.values())
+        out.setflags(write=False)
+        return out
 
     def spec(self, *fragments: str, lanes: int = 1) -> KernelSpec:
-        """The compiled module with these fragments, for this model, integrator and kind of process noise."""
+        """The compiled module with these fragments, for this model, integrator, kind of noise, and manoeuvres or none."""
         assert self.integrator is not None
-        return KernelSpec(self.model, self.integrator.scheme, fragments, lanes)
+        return KernelSpec(self.model, self.integrator.scheme, composed(self, fragments), lanes)
 
     @property
     def noise_fragment(self) -> str:
         return "noise_integral" if self.process_noise.is_integral else "noise_scaled"
+
+    @property
+    def noise_varies(self) -> bool:
+        """Whether the noise of an interval depends on the states, so that it is not a multiple of one matrix."""
+        noise = self.process_noise
+        return noise.is_integral or noise.axes != "states" or any(m.covariance.any() for m in self.manoeuvres)
 
     def intervals(self, times: Array) -> tuple[float, Array, Array]:
         """Time of the prior, and for each epoch the substeps and the noise scale of the interval that ends there."""
@@ -211,7 +245,11 @@ class Problem:
         start = float(times[0]) if self.prior_time is None else float(self.prior_time)
         if start > times[0]:
             raise ValueError(f"the prior is at {start:g} s, after the first measurement at {times[0]:g} s")
-        dt = np.diff(times, prepend=start)
+        if self.manoeuvres and self.manoeuvres[0].time <= start:
+            raise ValueError(f"the manoeuvre at {self.manoeuvres[0].time:g} s is not after the prior at {start:g} s")
+        dt = np.empty_like(times)
+        dt[0] = times[0] - start
+        np.subtract(times[1:], times[:-1], out=dt[1:])
         return start, self.integrator.counts(dt), self.process_noise.scale(dt)
 
     # ---- the model's functions, for users ------------------------------------------------------------------------
@@ -249,3 +287,7 @@ def _number(value: Any, what: str) -> float:
     if out.size != 1 or not np.isfinite(out).all():
         raise ValueError(f"{what} is {value!r}; it must be one finite number")
     return float(out.reshape(-1)[0])
+
+
+def _is_diagonal(R: Array) -> bool:
+    return len(R) == 1 or not np.count_nonzero(R - np.diag(np.diag(R)))

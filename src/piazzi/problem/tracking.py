@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -101,8 +100,9 @@ class Tracking:
 
     @cached_property
     def first_row(self) -> Array:
-        starts = np.flatnonzero(np.diff(self.row_times, prepend=-np.inf) > 0)
-        return np.append(starts, len(self.row_times)).astype(np.int64)
+        new = np.ones(len(self.row_times) + 1, dtype=bool)  # the end counts as the first row of an epoch after the last
+        np.greater(self.row_times[1:], self.row_times[:-1], out=new[1:-1])
+        return np.flatnonzero(new).astype(np.int64, copy=False)
 
     @cached_property
     def times(self) -> Array:
@@ -159,7 +159,9 @@ class Tracking:
         if names is None:
             others = [s.name for s in problem.stations if s.name != station]
             if len(others) != 1:
-                raise ValueError(f"the tracking does not say which station measured; beside {station!r} the problem has {others}")
+                raise ValueError(
+                    f"the tracking does not say which station measured; beside {station!r} the problem has {others}"
+                )
             names = np.full(len(self.row_times), others[0])
         row_times = np.concatenate([self.row_times, at])
         order = np.argsort(row_times, kind="stable")
@@ -168,10 +170,10 @@ class Tracking:
         return Tracking(row_times[order], values, stations, self.truth, self.epoch)
 
     def _check_widths(self, problem: Problem, index: Array) -> None:
-        widths = np.array([len(s.noise) for s in problem.stations])
         columns = self.values.shape[1]
-        if columns <= widths.min():
+        if columns <= min([len(s.noise) for s in problem.stations]):
             return
+        widths = np.array([len(s.noise) for s in problem.stations])
         beyond = np.arange(columns)[None, :] >= widths[index][:, None]
         bad = np.argwhere(beyond & ~np.isnan(self.values))
         if bad.size:

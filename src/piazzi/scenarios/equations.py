@@ -23,10 +23,16 @@ class Physics:
 
     model: Model | None = None
     states: list[str] = field(default_factory=list)
+    memory: dict[str, str] = field(default_factory=dict)
     constants: list[str] = field(default_factory=list)
     units: dict[str, Unit] = field(default_factory=dict)
     components: dict[str, dict[str, Unit]] = field(default_factory=dict)
     numbers: dict[str, dict[str, Unit]] = field(default_factory=dict)
+
+    @property
+    def estimated(self) -> list[str]:
+        """Everything that is estimated, in the order of `Model.names`."""
+        return [*self.states, *self.memory, *self.constants]
 
     def factors(self, names: Collection[str]) -> list[float]:
         """SI factor of each of these states and parameters."""
@@ -40,7 +46,7 @@ def shared(model: Model) -> Model:
 
 
 def read_physics(file: Table, units: Units) -> Physics:
-    """Read [states], [groups], [dynamics] or [step], [parameters] and [sensors]."""
+    """Read [states], [memory], [groups], [dynamics] or [step], [parameters] and [sensors]."""
     before = len(file.faults)
     out = Physics()
     out.units |= named_units(file, "states", units, "state")
@@ -51,6 +57,7 @@ def read_physics(file: Table, units: Units) -> Physics:
         file.fault("states", f"has {len(out.states)} states; at most {MAX_STATES} are allowed")
     if not 0 < len(out.states) <= MAX_STATES:
         return out
+    _memory(file.table("memory"), out)
     parameters = _parameters(file.table("parameters"), units, out)
     dynamics = _dynamics(file, out)
     sensors = [_sensor(name, table, units, out) for name, table in file.table("sensors").tables()]
@@ -60,7 +67,9 @@ def read_physics(file: Table, units: Units) -> Physics:
         with file.faults.at(""):
             equations = tuple(dynamics[s] for s in out.states)
             sound = tuple(s for s in sensors if s is not None)
-            out.model = shared(Model(tuple(out.states), equations, sound, tuple(parameters), groups, labels, "step" in file))
+            out.model = shared(
+                Model(tuple(out.states), equations, sound, tuple(parameters), groups, labels, "step" in file, out.memory)
+            )
     return out
 
 
@@ -103,6 +112,18 @@ def unit_of(table: Table, key: str, units: Units) -> Unit:
 
 def _example(units: Units) -> str:
     return f"'length/time' (here {units.base[0]}/{units.base[2]}), or '1' for none"
+
+
+def _memory(table: Table, out: Physics) -> None:
+    """Names for what a state was at the epoch before."""
+    for name in table.data:
+        state = table.text(name)
+        if state not in out.states:
+            table.fault(name, f"must be the name of a state{nearest(str(state)[:60], out.states)}")
+            continue
+        with table.faults.at(table.at(name)):
+            out.memory[name_of(name, "memory")] = state
+            out.units[name] = out.units[state]
 
 
 def _parameters(table: Table, units: Units, out: Physics) -> list[Parameter]:
@@ -216,9 +237,8 @@ def _groups(file: Table, out: Physics) -> dict[str, tuple[str, ...]]:
         if not isinstance(members, list) or not all(isinstance(m, str) for m in members) or not members:
             table.fault(name, f"must be a list of states, not {shown(members)}")
             continue
-        known = [*out.states, *out.constants]
         for member in members:
-            if member not in known:
-                table.fault(name, f"names {shown(member)}, which is not a state{nearest(member[:60], known)}")
+            if member not in out.estimated:
+                table.fault(name, f"names {shown(member)}, which is not a state{nearest(member[:60], out.estimated)}")
         groups[name] = tuple(members)
     return groups

@@ -6,17 +6,26 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from piazzi.kernels import Discrete, Integrator, RungeKutta4, Taylor
+from piazzi import kernels
+from piazzi.kernels import Integrator
 from piazzi.scenarios.faults import shown
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import Units
 
 INTEGRATORS: Mapping[str, type[Integrator]] = {
-    "taylor": Taylor,
-    "rk4": RungeKutta4,
-    "discrete": Discrete,
+    "taylor": kernels.Taylor,
+    "euler": kernels.Euler,
+    "midpoint": kernels.Midpoint,
+    "heun": kernels.Heun,
+    "ralston": kernels.Ralston,
+    "rk4": kernels.RungeKutta4,
+    "dopri5": kernels.DormandPrince5,
+    "rk8": kernels.RungeKutta8,
+    "runge-kutta": kernels.RungeKutta,
+    "adaptive": kernels.DormandPrince,
+    "kepler": kernels.Kepler,
+    "discrete": kernels.Discrete,
 }
-IN_SECONDS = ("max_step",)
 
 
 def read_integrator(table: Table, units: Units) -> Integrator | None:
@@ -27,12 +36,7 @@ def read_integrator(table: Table, units: Units) -> Integrator | None:
             table.fault("", f"needs a method: one of {', '.join(INTEGRATORS)}")
         return None
     kind = INTEGRATORS[method]
-    settings: dict[str, Any] = {}
-    for field in fields(kind):
-        if field.name in IN_SECONDS:
-            settings[field.name] = table.number(field.name, units.time(), positive=True)
-        else:
-            settings[field.name] = _plain(table.raw(field.name))
+    settings = {field.name: _setting(table, field.name, units) for field in fields(kind)}
     table.finish()
     with table.faults.at(table.path):
         try:
@@ -51,8 +55,21 @@ def write_integrator(integrator: Integrator) -> dict[str, Any]:
     raise ValueError(f"integrator {type(integrator).__name__} cannot be written to a file; {', '.join(INTEGRATORS)} can")
 
 
+def _setting(table: Table, name: str, units: Units) -> Any:
+    """The value of an option, in SI."""
+    value = table.raw(name)
+    if isinstance(value, bool):
+        table.fault(name, f"must not be {shown(value)}")
+        return None
+    if name == "max_step":
+        return table.number(name, units.time(), positive=True)
+    if name == "mu" and not isinstance(value, str):
+        return table.number(name, units.unit("length**3/time**2").factor, positive=True)
+    return _plain(value)
+
+
 def _plain(value: Any) -> Any:
-    """Lists as tuples, so that settings hash; booleans are no numbers here."""
+    """Lists as tuples, so that settings hash."""
     return tuple(_plain(v) for v in value) if isinstance(value, list) else value
 
 

@@ -66,12 +66,12 @@ def read_prior(table: Table, physics: Physics, truth: Table, units: Units) -> tu
 
 
 def read_noise(table: Table, physics: Physics) -> ProcessNoise | None:
-    """Process noise of the states, or of states and estimated constants; names that a table leaves out have none."""
+    """Process noise of the states, or of everything that is estimated; names that a table leaves out have none."""
     names = physics.states
-    everything = [*names, *physics.constants]
+    everything = physics.estimated
     for value in map(table.raw, SPREADS):
         whole = isinstance(value, list) and len(value) == len(everything)
-        if whole or (isinstance(value, Mapping) and not set(physics.constants).isdisjoint(value)):
+        if whole or (isinstance(value, Mapping) and not set(everything[len(names) :]).isdisjoint(value)):
             names = everything
     per = table.text("per", "second", ("second", "step"))
     method = table.text("method", "integral", ("integral", "scaled"))

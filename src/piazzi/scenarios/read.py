@@ -20,7 +20,7 @@ from piazzi.scenarios.truth import read_truth
 from piazzi.scenarios.units import Units
 
 SECTIONS = (
-    "title", "units", "states", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise",
+    "title", "units", "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise",
     "integrator", "times", "truth", "picture",
 )  # fmt: skip
 MAX_STEPS = 10**10

@@ -36,7 +36,7 @@ def read_truth(table: Table, physics: Physics, prior: Gaussian | None, units: Un
 
 
 def _true_parameters(table: Table, physics: Physics) -> dict[str, float]:
-    known = [name for name in physics.units if name not in physics.states]
+    known = [name for name in physics.units if name not in (*physics.states, *physics.memory)]
     out: dict[str, float] = {}
     for name in table.data:
         if name not in known:

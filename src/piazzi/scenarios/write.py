@@ -16,7 +16,7 @@ from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import Labels
 
 SECTIONS = (
-    "states", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise", "integrator",
+    "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise", "integrator",
     "truth",
 )  # fmt: skip
 
@@ -61,6 +61,7 @@ def problem_from_tables(tables: Mapping[str, Any], name: str, source: str) -> Pr
 def _equations(model: Model) -> dict[str, Any]:
     return {
         "states": {s: model.unit(s) for s in model.states},
+        "memory": dict(model.memory),
         "groups": {g: list(members) for g, members in model.groups},
         "step" if model.discrete else "dynamics": dict(zip(model.states, model.dynamics, strict=True)),
         "sensors": {s.name: _sensor(model, s) for s in model.sensors},

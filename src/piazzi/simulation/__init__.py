@@ -89,6 +89,7 @@ def true_problem(problem: Problem) -> Problem:
         parameters=parameters,
         process_noise=truth.process_noise or problem.process_noise,
         integrator=truth.integrator or problem.integrator,
+        manoeuvres=problem.manoeuvres if truth.manoeuvres is None else truth.manoeuvres,
         truth=None,
     )
 

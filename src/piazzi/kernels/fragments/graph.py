@@ -28,6 +28,7 @@ def weigh(defect, scale, L, D, at, tether, y, broken, report, slot):
         for k in range(i):
             y[i] = y[i] - L[i * N + k] * y[k]
         variance = D[i] * scale
+        broken[at + i] = 0.0
         if variance > 0.0:
             report[slot] += y[i] * y[i] / variance
         else:

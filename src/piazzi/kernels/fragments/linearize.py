@@ -7,7 +7,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 def linearize_rows(a, W, t, x, first_row, z, station, sensor, numbers, R, correlated, p, nu, H, L):
     """Innovations and Jacobians of all rows of states a ... a + W - 1 in units of their noise, stored from position 0.
 
-    Returns the sum of squares.
+    Returns the sum of squares, NaN where a measurement that is there has no prediction.
     """
     base = first_row[a]
     cost = 0.0
@@ -25,5 +25,5 @@ def linearize_rows(a, W, t, x, first_row, z, station, sensor, numbers, R, correl
                     nu[out + i] = weight * nu[out + i]
                     store(H, (out + i) * N, weight * load_vector(H, (out + i) * N, N))
             for i in range(M):
-                cost += 0.0 if isnan(nu[out + i]) else nu[out + i] * nu[out + i]
+                cost += 0.0 if isnan(z[row * M + i]) else nu[out + i] * nu[out + i]
     return cost

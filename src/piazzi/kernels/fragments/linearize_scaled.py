@@ -19,25 +19,24 @@ def noise_varies():
 def linearize_dynamics(a, W, t, count, scale, p, Q, x, f, Phi, Q_all):
     """f and Phi of states a ... a + W - 2 at their current values, stored from position 0."""
     j = 0
-    while j + LANES < W:
-        k = a + j
-        same = 1
-        for lane in range(1, LANES):
-            if count[k + lane + 1] != count[k + 1]:
-                same = 0
-        if same == 0:
-            break
-        start = load_lanes(t, k, 1, 1, LANES)[0]
-        h = (load_lanes(t, k + 1, 1, 1, LANES)[0] - start) / count[k + 1]
-        y, R = substep_jacobian(start, h, remember(load_lanes(x, k * N, N, N, LANES)), first_rows(), p)
-        for i in range(1, count[k + 1]):
-            y, R = substep_jacobian(start + i * h, h, y, R, p)
-        store_lanes(f, j * N, N, y)
-        store_lanes(Phi, j * N * N, N * N, complete(R))
-        j += LANES
     while j + 1 < W:
         k = a + j
-        y_one, Phi_one = transition(t[k], t[k + 1] - t[k], count[k + 1], load_vector(x, k * N, N), p)
-        store(f, j * N, y_one)
-        store(Phi, j * N * N, Phi_one)
-        j += 1
+        together = 1 if j + LANES < W else 0
+        if together:
+            for lane in range(1, LANES):
+                if count[k + lane + 1] != count[k + 1]:
+                    together = 0
+        if together:
+            start = load_lanes(t, k, 1, 1, LANES)[0]
+            h = (load_lanes(t, k + 1, 1, 1, LANES)[0] - start) / count[k + 1]
+            y, R = substep_jacobian(start, h, remember(load_lanes(x, k * N, N, N, LANES)), first_rows(), p)
+            for i in range(1, count[k + 1]):
+                y, R = substep_jacobian(start + i * h, h, y, R, p)
+            store_lanes(f, j * N, N, y)
+            store_lanes(Phi, j * N * N, N * N, complete(R))
+            j += LANES
+        else:
+            y_one, Phi_one = transition(t[k], t[k + 1] - t[k], count[k + 1], load_vector(x, k * N, N), p)
+            store(f, j * N, y_one)
+            store(Phi, j * N * N, Phi_one)
+            j += 1

@@ -1,26 +1,33 @@
-"""Process noise over a step as the integral of Phi Q Phi^T, for white noise of spectral density Q in continuous time."""
+"""Process noise over an interval as the integral of Phi Q Phi^T, for white noise of spectral density Q in continuous time."""
 
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def advance(t, dt, count, x, p, Q, scale):
-    """Next state, its transition matrix, and the process noise of the step.
+def add_noise(Q_step, t, h, x, middle, y, G, Q, p):
+    """Process noise at the end of a substep from the one at its beginning.
 
-    Simpson's rule over each substep, in congruences, so that the result is semidefinite whatever the step: with G over the
-    substep and E over its second half, Q' = G (Q' + h/6 Q) G^T + 4h/6 E Q E^T + h/6 Q.
+    Simpson's rule in congruences, so that the result is semidefinite whatever the step: with G over the substep and E over
+    its second half, Q' = G (Q' + h/6 Q) G^T + 4h/6 E Q E^T + h/6 Q, with Q in the axes of each of the three states.
     """
+    _, second = substep_jacobian(t + 0.5 * h, 0.5 * h, middle, identity_rows(), p)
+    E = complete(second)
+    begin = Q_step + (h / 6.0) * noise_in_axes(Q, x)
+    return G @ begin @ G.T + (h / 1.5) * (E @ noise_in_axes(Q, middle) @ E.T) + (h / 6.0) * noise_in_axes(Q, y)
+
+
+@inline
+def coast_noise(t, dt, count, x, R, p, Q, scale):
+    """Next state, its derivative times the rows `R`, and the process noise of the interval."""
     h = dt / count
-    x = remember(x)
-    Phi = complete(first_rows())
+    Phi = complete(R)
     Q_step = 0.0 * Q
     for i in range(count):
         at = t + i * h
         middle = substep(at, 0.5 * h, x, p)
-        _, second = substep_jacobian(at + 0.5 * h, 0.5 * h, middle, identity_rows(), p)
-        x, first = substep_jacobian(at, h, x, identity_rows(), p)
+        y, first = substep_jacobian(at, h, x, identity_rows(), p)
         G = complete(first)
-        E = complete(second)
         Phi = G @ Phi
-        Q_step = G @ (Q_step + (h / 6.0) * Q) @ G.T + (h / 1.5) * (E @ Q @ E.T) + (h / 6.0) * Q
+        Q_step = add_noise(Q_step, at, h, x, middle, y, G, Q, p)
+        x = y
     return x, Phi, symmetric(Q_step)

@@ -1,10 +1,10 @@
-"""Process noise over a step as a multiple of one matrix: Q per step (scale 1), or Q dt (scale dt)."""
+"""Process noise over an interval as a multiple of one matrix: Q per step (scale 1), or Q dt (scale dt)."""
 
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def advance(t, dt, count, x, p, Q, scale):
-    """Next state, its transition matrix, and the process noise of the step."""
-    x, Phi = transition(t, dt, count, x, p)
-    return x, Phi, scale * Q
+def coast_noise(t, dt, count, x, R, p, Q, scale):
+    """Next state, its derivative times the rows `R`, and the process noise of the interval, which enters at its end."""
+    x, R = coast_jacobian(t, dt, count, x, R, p)
+    return x, complete(R), scale * noise_in_axes(Q, x)

@@ -1,4 +1,4 @@
-"""From one epoch to the next, in substeps."""
+"""From one epoch to the next without events."""
 
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
@@ -11,20 +11,12 @@ def symmetric(P):
 
 @inline
 def travel(t, dt, count, x, p):
-    """The state `dt` seconds later, in `count` substeps."""
-    x = remember(x)
-    h = dt / count
-    for i in range(count):
-        x = substep(t + i * h, h, x, p)
-    return x
+    """The state `dt` seconds later."""
+    return coast(t, dt, count, remember(x), p)
 
 
 @inline
 def transition(t, dt, count, x, p):
     """The state `dt` seconds later, and its derivative with respect to the state now."""
-    x = remember(x)
-    R = first_rows()
-    h = dt / count
-    for i in range(count):
-        x, R = substep_jacobian(t + i * h, h, x, R, p)
+    x, R = coast_jacobian(t, dt, count, remember(x), first_rows(), p)
     return x, complete(R)

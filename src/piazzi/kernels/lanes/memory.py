@@ -111,7 +111,9 @@ def load_matrix(typing: Any, a: Any, at: Any, r: Any, n: Any) -> Any:
 
 @intrinsic
 def store(typing: Any, a: Any, at: Any, value: Any) -> Any:
-    """Write a vector, or a matrix row by row, into the flat array `a` from position `at`."""
+    """Write a vector, or a matrix row by row, into the flat array `a` from position `at`; lanes take `store_lanes`."""
+    if value.w > 1:
+        return None
 
     def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
         rows = [args[2]] if isinstance(value, Vector) else parts(b, args[2])

@@ -108,10 +108,10 @@ def _overlay(ax: Axes, comparison: Comparison, group: str, lengths: Sequence[Arr
     unit = unit_of(model.unit(s) for s in dict(model.groups).get(group, (group,)))
     show = display_of(unit, [float(np.nanmedian(v)) for v in both])
     time, part, names = time_axis(ax, times), drawn(len(times)), tuple(name for name, _ in views)
-    for (name, view), length in zip(views, lengths, strict=True):
+    for n, ((name, view), length) in enumerate(zip(views, lengths, strict=True)):
         if length is not None:
-            style = line_of(name, view, names)
-            ax.plot(times[part] * time.factor, length[part] * show.factor, **style, lw=1.2, label=label_of(name, view))
+            style = line_of(name, view, names) | {"lw": 2.2 - 1.2 * n / len(views)}  # where two coincide, both are seen
+            ax.plot(times[part] * time.factor, length[part] * show.factor, **style, label=label_of(name, view))
     if any(v is not None and (v > 0).any() for v in lengths):
         ax.set_yscale("log")
         plain_ticks(ax)

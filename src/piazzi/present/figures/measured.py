@@ -27,6 +27,8 @@ def component_of(problem: Problem, column: int) -> tuple[str, str]:
 
 def measurements(ax: Axes, problem: Problem, tracking: Tracking, column: int = 0) -> Axes:
     """One component of the measurements against time, a colour for each station."""
+    from matplotlib.ticker import MultipleLocator
+
     name, unit = component_of(problem, column)
     values = tracking.values[:, column]
     show = display_of(unit, [float(np.nanmax(np.abs(values), initial=0.0))])
@@ -45,7 +47,7 @@ def measurements(ax: Axes, problem: Problem, tracking: Tracking, column: int = 0
             label=plain(station.name),
         )
     if show.unit == "deg" and np.nanmax(np.abs(values), initial=0.0) > np.pi / 2:
-        ax.set_yticks(np.arange(-180, 181, 90))
+        ax.yaxis.set_major_locator(MultipleLocator(90))
     ax.set_ylabel(show.label(plain(name)))
     return ax
 
@@ -72,7 +74,7 @@ def _limit(ax: Axes, t: Array, nu: Array, band: Array, show: Display, colour: st
     """Limits by the band once settled and by nearly all innovations; those few beyond become arrows at the edge."""
     if not len(nu):
         return
-    half = max(1.15 * float(np.quantile(np.abs(nu), 0.99)), 1.6 * float(np.median(band))) * show.factor
+    half = max(1.15 * float(np.quantile(np.abs(nu), 0.99, method="lower")), 1.6 * float(np.median(band))) * show.factor
     if half > 0:
         ax.set_ylim(-half, half)
         for sign, marker in ((1, "^"), (-1, "v")):

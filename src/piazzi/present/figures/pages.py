@@ -123,9 +123,9 @@ def error_page(comparison: Comparison) -> Figure:
     for ax, (name, estimate) in zip(axes[0], estimates, strict=True):
         ax.set_title(label_of(name, estimate.view))
     figure.align_ylabels(list(axes[:, 0]))
-    if any(ax.get_yscale() == "symlog" for ax in axes[:, 0]):
-        figure.supxlabel("Scales are linear about zero and logarithmic further out.", fontsize=8, color=MEASURED)
-    _legend(figure, {"error": {"lw": 1.3, "color": MEASURED}, "+-3 sigma": {"lw": 8, "color": MEASURED, "alpha": 0.25}})
+    bent = any(ax.get_yscale() == "symlog" for ax in axes[:, 0])
+    lines = {"error": {"lw": 1.3, "color": MEASURED}, "+-3 sigma": {"lw": 8, "color": MEASURED, "alpha": 0.25}}
+    _legend(figure, lines, "Scales are linear about zero and logarithmic further out" if bent else "")
     return figure
 
 
@@ -148,10 +148,9 @@ def overlay_page(comparison: Comparison) -> Figure:
     return figure
 
 
-def _legend(figure: Figure, lines: Mapping[str, Mapping[str, Any]]) -> None:
+def _legend(figure: Figure, lines: Mapping[str, Mapping[str, Any]], title: str) -> None:
     """A legend of line styles alone, below everything."""
     from matplotlib.lines import Line2D
 
-    figure.legend(
-        [Line2D([], [], **style) for style in lines.values()], list(lines), loc="outside lower center", ncols=len(lines)
-    )
+    handles = [Line2D([], [], **style) for style in lines.values()]
+    figure.legend(handles, list(lines), loc="outside lower center", ncols=len(lines), title=title or None, title_fontsize=8)

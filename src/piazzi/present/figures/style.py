@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.evaluate.quantities import Display
+from piazzi.evaluate.quantities import Display, printable
 from piazzi.problem.checks import Array
 
 if TYPE_CHECKING:
@@ -68,8 +68,8 @@ def label_of(name: str, view: str) -> str:
 
 
 def plain(text: str) -> str:
-    """User text that matplotlib does not take for a formula."""
-    return text.replace("$", r"\$")
+    """User text that matplotlib does not take for a formula, nor for characters that no font has."""
+    return printable(text).replace("$", r"\$")
 
 
 def time_display(times: Array) -> Display:

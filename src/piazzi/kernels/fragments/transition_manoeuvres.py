@@ -1,0 +1,62 @@
+"""From one epoch to the next through manoeuvres: at each, the state jumps.
+
+The manoeuvres follow the parameters in `p`: how many there are, then for each its time, the jump (N) and its covariance (N, N).
+One at the time of an epoch belongs to the interval that ends there.
+"""
+
+from piazzi.kernels.vocabulary import *  # noqa: F403
+
+
+@inline
+def symmetric(P):
+    """The symmetric part; rounding must not grow into an asymmetry."""
+    return 0.5 * (P + P.T)
+
+
+@inline
+def manoeuvre(i):
+    """Position in `p` of manoeuvre `i`."""
+    return GIVEN + 1 + i * (1 + N + N * N)
+
+
+@inline
+def happens(when, t, dt):
+    """Whether `when` is in (t, t + dt], whichever way the sum was rounded."""
+    slack = 1e-12 * maximum(fabs(when), fabs(t))
+    return when - t > slack and when - (t + dt) <= slack
+
+
+@inline
+def share(count, part, dt):
+    """Substeps for a part of an interval, at least one."""
+    return count if part == dt else 1 + int(count * (part / dt) * (1.0 - 1e-9))
+
+
+@inline
+def travel(t, dt, count, x, p):
+    """The state `dt` seconds later."""
+    x = remember(x)
+    done = 0.0
+    for i in range(int(p[GIVEN])):
+        at = manoeuvre(i)
+        if happens(p[at], t, dt):
+            part = minimum(p[at] - t, dt) - done
+            x = coast(t + done, part, share(count, part, dt), x, p) + load_vector(p, at + 1, N)
+            done += part
+    return coast(t + done, dt - done, share(count, dt - done, dt), x, p)
+
+
+@inline
+def transition(t, dt, count, x, p):
+    """The state `dt` seconds later, and its derivative with respect to the state now."""
+    x, R = remember(x), first_rows()
+    done = 0.0
+    for i in range(int(p[GIVEN])):
+        at = manoeuvre(i)
+        if happens(p[at], t, dt):
+            part = minimum(p[at] - t, dt) - done
+            x, R = coast_jacobian(t + done, part, share(count, part, dt), x, R, p)
+            x = x + load_vector(p, at + 1, N)
+            done += part
+    x, R = coast_jacobian(t + done, dt - done, share(count, dt - done, dt), x, R, p)
+    return x, complete(R)

@@ -1,0 +1,33 @@
+"""Which kernel fragments a problem needs: estimators ask for a part, the problem's settings decide which one it is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from piazzi.kernels import DormandPrince
+
+if TYPE_CHECKING:
+    from piazzi.problem.problem import Problem
+
+
+def composed(problem: Problem, fragments: tuple[str, ...]) -> tuple[str, ...]:
+    """The fragments by the names of their files, in order.
+
+    "transition" becomes the motion of the integrator and the events on the way; "noise_scaled" and "noise_integral" become the
+    axes of the noise, its integration and the same events; "linearize_scaled" is replaced where states cannot be worked on
+    together, or where the noise is not a multiple of one matrix.
+    """
+    integrator = problem.integrator
+    assert integrator is not None
+    events = "_manoeuvres" if problem.manoeuvres else ""
+    axes = "axes_orbit" if problem.process_noise.axes == "orbit" else "axes"
+    integral = "noise_adaptive" if isinstance(integrator, DormandPrince) else "noise_integral"
+    together = integrator.in_lanes and not events
+    linearize = "linearize_integral" if problem.noise_varies else "linearize_scaled" if together else "linearize_each"
+    parts = {
+        "transition": (*integrator.fragments, f"transition{events}"),
+        "noise_scaled": (axes, "noise_scaled", f"advance{events}"),
+        "noise_integral": (axes, integral, f"advance{events}"),
+        "linearize_scaled": (linearize,),
+    }
+    return tuple(part for name in fragments for part in parts.get(name, (name,)))

@@ -1,0 +1,185 @@
+"""``piazzi estimate`` and ``piazzi compare``: contracts, files and statuses."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi.problem import Gaussian
+from piazzi.scenarios import load_scenario
+
+SCENARIO = "b612-range"
+
+
+@pytest.fixture(scope="module")
+def ekf():
+    return pz.ExtendedKalmanFilter().estimate(*pz.load(SCENARIO))
+
+
+def test_json_of_one_estimate(call, ekf):
+    result = call("estimate", SCENARIO, "--json")
+    document = result.document
+    assert (result.status, result.said) == (0, [])
+    assert document["schema"] == "piazzi.estimate/1"
+    assert (document["source"], document["epochs"], document["states"]) == (SCENARIO, 100, ["x", "y", "vx", "vy"])
+    assert document["units"] == {"x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}
+    (row,) = document["rows"]
+    assert (row["estimator"], row["view"], row["success"], row["diverged"]) == ("ekf", "realtime", True, False)
+    assert row["final"]["time"] == ekf.times[-1]
+    assert row["final"]["mean"] == ekf.mean[-1].tolist()
+    assert row["final"]["sigma"] == pytest.approx(np.sqrt(np.diagonal(ekf.covariance[-1])))
+    length = np.linalg.norm((ekf.mean - ekf.tracking.truth)[:, :2], axis=1)
+    assert row["position_rmse"] == pytest.approx(np.sqrt(np.mean(length**2)))
+
+
+def test_json_of_a_comparison(call):
+    result = call("compare", SCENARIO, "--with", "ekf", "--with", "window:10x2", "--with", "graph", "--json")
+    document = result.document
+    assert document["schema"] == "piazzi.compare/1"
+    assert [(r["estimator"], r["view"]) for r in document["rows"]] == [
+        ("ekf", "realtime"),
+        ("window:10x2", "realtime"),
+        ("window:10x2", "delayed"),
+        ("graph", "delayed"),
+    ]
+    assert all("final" not in r for r in document["rows"])
+
+
+def test_the_seed_is_the_draw(call):
+    one, same, other = (call("estimate", SCENARIO, "--json", "--seed", s).document["rows"][0] for s in (1, 1, 2))
+    assert one["position_rmse"] == same["position_rmse"] != other["position_rmse"]
+
+
+def test_the_founding_recording(call, data_dir):
+    """Figures of an independent C program."""
+    result = call("compare", data_dir / "satellite" / "slide_example.npz", "--with", "ekf", "--json")
+    document = result.document
+    (row,) = document["rows"]
+    assert document["source"] == "slide_example.npz"
+    assert row["position_rmse"] == pytest.approx(616655.46, rel=1e-6)
+    assert row["velocity_rmse"] == pytest.approx(142.2416, rel=1e-6)
+    assert row["position_rmse_last_half"] == pytest.approx(13985.43, rel=1e-6)
+    assert row["velocity_rmse_last_half"] == pytest.approx(6.72672, rel=1e-5)
+
+
+def test_both_updates_run_on_both_experiments(call):
+    for scenario in ("b612-range", "b612-range-q0"):
+        rows = call("compare", scenario, "--with", "ekf:joint", "--with", "ekf:components", "--json").document["rows"]
+        assert all(r["success"] for r in rows)
+        assert rows[0]["position_rmse"] == pytest.approx(rows[1]["position_rmse"], rel=1e-6)
+
+
+def test_people_get_the_state_the_table_and_a_sentence(call):
+    result = call("estimate", SCENARIO)
+    assert result.status == 0
+    assert "100 epochs over 9.90 s, 100 measurements by radar, truth known" in result.out
+    assert "State at t = 9.9 s, ekf" in result.out
+    assert "position error of ekf is" in result.out
+    assert "\x1b" not in result.out  # no colours where nobody looks
+
+
+@pytest.mark.parametrize("width", [40, 80, 132])
+def test_no_line_is_wider_than_the_terminal(call, monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert max(map(len, call("compare", SCENARIO, "--with", "ekf", "--with", "window:10").out.splitlines())) <= width
+
+
+# ---- files ---------------------------------------------------------------------------------------------------------------
+
+
+def test_an_estimate_is_written_in_each_format(call, ekf, tmp_path):
+    for ending in ("json", "csv", "npz", "nc"):
+        assert call("estimate", SCENARIO, "-o", tmp_path / f"e.{ending}").status == 0
+    series = json.loads((tmp_path / "e.json").read_text())["series"]
+    assert series["mean"] == ekf.mean.tolist()
+    assert series["covariance"] == ekf.covariance.tolist()
+    with np.load(tmp_path / "e.npz", allow_pickle=False) as arrays:
+        assert (arrays["mean"] == ekf.mean).all()
+    from piazzi.io import load_estimate
+
+    assert (load_estimate(tmp_path / "e.nc").mean == ekf.mean).all()
+    with open(tmp_path / "e.csv", newline="") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    assert [float(r["x"]) for r in rows] == ekf.mean[:, 0].tolist()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["e.csv", "e.json", "e.nc", "e.npz"]
+
+
+def test_dash_is_json_on_stdout_and_nothing_else(call):
+    plain, with_json = call("estimate", SCENARIO, "-o", "-"), call("estimate", SCENARIO, "-o", "-", "--json")
+    assert len(plain.document["series"]["times"]) == len(with_json.document["series"]["times"]) == 100
+
+
+def test_rows_of_a_comparison_are_written(call, tmp_path):
+    assert call("compare", SCENARIO, "--with", "window:10", "-o", tmp_path / "c.csv", "--json").document["epochs"] == 100
+    with open(tmp_path / "c.csv", newline="") as file:
+        assert [r["view"] for r in csv.DictReader(file)] == ["realtime", "delayed"]
+    assert call("compare", SCENARIO, "--with", "ekf", "-o", tmp_path / "c.json").status == 0
+    assert json.loads((tmp_path / "c.json").read_text())["schema"] == "piazzi.compare/1"
+
+
+@pytest.mark.parametrize("command", ["estimate", "compare", "simulate"])
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("{}/absent/e.csv", "there is no folder"),
+        ("{}/e.txt", "the file must end in"),
+        ("{}/folder.csv", "it is a folder"),
+        ("{}/file.csv/e.csv", "there is no folder"),
+        ("/proc/e.csv", "cannot be written"),
+    ],
+)
+def test_output_that_cannot_be_written_is_refused_before_anything_runs(call, monkeypatch, tmp_path, command, target, message):
+    (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "file.csv").write_text("kept")
+    monkeypatch.setattr("piazzi.cli.sources.load_source", None)  # reading the source would be an error of another kind
+    assert message in call(command, SCENARIO, "-o", target.format(tmp_path)).refused()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file.csv", "folder.csv"]
+    assert (tmp_path / "file.csv").read_text() == "kept"
+
+
+def test_a_failed_run_leaves_the_old_file(call, tmp_path):
+    (tmp_path / "e.json").write_text("kept")
+    call("estimate", "nowhere.npz", "-o", tmp_path / "e.json").refused()
+    assert [p.read_text() for p in tmp_path.iterdir()] == ["kept"]
+
+
+def test_several_estimates_do_not_fit_one_file(call, tmp_path):
+    line = call("estimate", SCENARIO, "--with", "ekf", "--with", "window:5", "-o", tmp_path / "e.json").refused()
+    assert "-o writes one estimate" in line
+
+
+# ---- estimators that do not succeed ---------------------------------------------------------------------------------------
+
+
+def test_an_estimator_that_raises_keeps_its_row_and_the_others_theirs(call, monkeypatch):
+    def fail(self, problem, tracking):
+        raise RuntimeError("out of luck")
+
+    monkeypatch.setattr(pz.FactorGraph, "estimate", fail)
+    result = call("compare", SCENARIO, "--with", "graph", "--with", "ekf", "--json")
+    assert result.status == 3
+    graph, ekf = result.document["rows"]
+    assert (graph["success"], graph["view"], graph["position_rmse"], graph["seconds"]) == (False, "delayed", None, None)
+    assert "out of luck" in graph["message"]
+    assert ekf["success"]
+    assert "graph did not succeed" in call("compare", SCENARIO, "--with", "graph", "--with", "ekf").out
+    assert call("estimate", SCENARIO, "--with", "graph").status == 3
+
+
+def test_an_estimate_that_is_not_finite_is_status_3_and_still_strict_json(call, tmp_path):
+    """A probe that is believed to start at rest falls into the centre."""
+    scenario = load_scenario(SCENARIO)
+    from dataclasses import replace
+
+    prior = Gaussian([1.0, 0, 0, 0], 1e-12 * np.eye(4))
+    problem = replace(scenario.problem, prior=prior, truth=None, process_noise=None)
+    tracking = pz.Tracking(np.arange(400) * 0.1, np.full(400, 9.0), truth=np.ones((400, 4)))
+    from piazzi.io import save
+
+    save(tmp_path / "fall.nc", problem, tracking)
+    result = call("estimate", tmp_path / "fall.nc", "--json", "-o", tmp_path / "fall.json")
+    (row,) = result.document["rows"]
+    assert (result.status == 3) == (not row["success"])
+    json.loads((tmp_path / "fall.json").read_text(), parse_constant=pytest.fail)

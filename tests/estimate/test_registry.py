@@ -1,0 +1,60 @@
+"""Estimators by name: what the command line writes is what the class is given."""
+
+import pytest
+
+import piazzi as pz
+from piazzi.estimate.registry import ESTIMATORS, parse, views_of
+
+
+@pytest.mark.parametrize(
+    ("text", "estimator"),
+    [
+        ("ekf", pz.ExtendedKalmanFilter()),
+        ("ekf:joint", pz.ExtendedKalmanFilter("joint")),
+        ("ekf:components", pz.ExtendedKalmanFilter("components")),
+        ("graph", pz.FactorGraph()),
+        ("graph:prior", pz.FactorGraph(start="prior")),
+        ("window", pz.SlidingWindow()),
+        ("window:7", pz.SlidingWindow(lag=7)),
+        (" window:100x3 ", pz.SlidingWindow(lag=100, iterations=3)),
+    ],
+)
+def test_names_mean_estimators(text, estimator):
+    found = parse(text)
+    assert type(found) is type(estimator)
+    assert vars(found) == vars(estimator)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("ekff", "unknown estimator 'ekff'; did you mean 'ekf'?"),
+        ("windw:100", "did you mean 'window'?"),
+        ("xyz", "known: ekf, "),
+        ("", "unknown estimator ''"),
+        ("ekf:both", "estimator 'ekf:both': update is 'both'; it must be one of"),
+        ("graph:nowhere", "estimator 'graph:nowhere': start is 'nowhere'"),
+        ("window:0", "estimator 'window:0': lag"),
+        ("window:x3", "write window:LAG or window:LAGxITERATIONS"),
+        ("window:-5", "write window:LAG"),
+        ("window:1.5", "write window:LAG"),
+        ("window:9999999999999", "write window:LAG"),
+        ("window:\u0663", "write window:LAG"),  # a digit, but not one of ours
+    ],
+)
+def test_what_means_nothing_is_refused_with_a_hint(text, message):
+    with pytest.raises(ValueError) as caught:
+        parse(text)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_every_name_can_be_built_and_knows_its_views():
+    for name, entry in ESTIMATORS.items():
+        estimator = parse(name)
+        assert callable(estimator.estimate)
+        assert views_of(estimator) == entry.views
+
+
+def test_an_estimator_of_somebody_else_is_taken_to_run_in_real_time():
+    assert views_of(object()) == ("realtime",)

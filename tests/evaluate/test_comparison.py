@@ -1,0 +1,215 @@
+"""The comparison and its contract: every estimator keeps a row, and the JSON is strict."""
+
+import json
+import re
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi.estimate import Estimate
+from piazzi.evaluate import Comparison, compare, evaluate
+from piazzi.scenarios import load_scenario
+from tests.evaluate.conftest import made
+
+ROW = {
+    "estimator", "view", "success", "message", "iterations", "seconds", "position_rmse", "velocity_rmse",
+    "position_rmse_last_half", "velocity_rmse_last_half", "mean_nees", "mean_nees_last_half", "mean_nis", "diverged",
+}  # fmt: skip
+POSITION = {"position": ["a", "b"]}
+
+
+@dataclass(frozen=True)
+class Ready:
+    """An estimator that has its answer already, or an error."""
+
+    result: Any
+
+    def estimate(self, problem, tracking) -> Estimate:
+        if isinstance(self.result, BaseException):
+            raise self.result
+        return self.result
+
+
+def compared(**results: Any) -> Comparison:
+    first = next(r for r in results.values() if isinstance(r, Estimate))
+    return compare(first.problem, first.tracking, {name: Ready(r) for name, r in results.items()}, source="here.npz")
+
+
+@pytest.fixture
+def good() -> Estimate:
+    rng = np.random.default_rng(2)
+    return made(rng.standard_normal((41, 2)), np.eye(2), truth=np.zeros((41, 2)), groups=POSITION)
+
+
+def strict(text: str) -> Any:
+    def refuse(name: str) -> None:
+        raise AssertionError(f"{name} is not JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_rows_hold_what_the_definitions_say(good):
+    row = compared(good=good).rows[0]
+    length = np.linalg.norm(good.mean, axis=1)
+    assert row.rmse["position"] == pytest.approx(np.sqrt((length**2).mean()))
+    assert row.rmse_last_half["position"] == pytest.approx(np.sqrt((length[20:] ** 2).mean()))  # rows K//2 onward
+    assert row.mean_nees == pytest.approx((length**2).mean())
+    assert row.mean_nees_last_half == pytest.approx((length[20:] ** 2).mean())
+    assert row.mean_nis == pytest.approx((good.innovations**2).mean())
+    assert (row.seconds, row.iterations, row.success, row.message) == (0.25, 41, True, "")
+
+
+def test_json_is_the_contract(good):
+    document = strict(compared(good=good).to_json())
+    assert document["schema"] == "piazzi.compare/1"
+    assert (document["source"], document["epochs"], document["states"]) == ("here.npz", 41, ["a", "b"])
+    (row,) = document["rows"]
+    assert set(row) == ROW
+    assert row["velocity_rmse"] is None  # the model names no such group
+
+
+def test_further_groups_have_their_own_keys(good):
+    model = replace(good.problem.model, groups={"clock": ["b"]})
+    estimate = replace(good, problem=replace(good.problem, model=model))
+    (row,) = strict(compared(good=estimate).to_json())["rows"]
+    assert set(row) == ROW | {"clock_rmse", "clock_rmse_last_half"}
+    assert row["position_rmse"] is None
+
+
+def test_a_model_without_groups_reports_each_state():
+    estimate = made(np.ones((4, 2)), np.eye(2), truth=np.zeros((4, 2)))
+    (row,) = strict(compared(one=estimate).to_json())["rows"]
+    assert (row["a_rmse"], row["b_rmse_last_half"]) == (1, 1)
+
+
+def test_without_truth_errors_are_null_and_the_rest_stands(good):
+    bare = replace(good, tracking=replace(good.tracking, truth=None))
+    comparison = compared(good=bare)
+    (row,) = strict(comparison.to_json())["rows"]
+    assert row["success"] is True
+    assert {k for k, v in row.items() if v is None} == {k for k in ROW if "rmse" in k or "nees" in k}
+    assert "no truth to compare with" in str(comparison)
+
+
+def test_numbers_that_are_not_finite_become_null(good):
+    mean = good.mean.copy()
+    mean[30] = np.nan
+    (row,) = strict(compared(lost=replace(good, mean=mean)).to_json())["rows"]
+    assert (row["success"], row["diverged"]) == (False, True)
+    assert row["position_rmse"] is None
+    assert row["mean_nees"] is None
+    assert "epoch 30" in row["message"]
+
+
+@pytest.mark.parametrize(
+    "error", [ValueError("no good"), RuntimeError("broken"), ZeroDivisionError(), np.linalg.LinAlgError("x")]
+)
+def test_one_that_fails_leaves_the_others_their_rows(good, error):
+    comparison = compared(before=good, bad=error, after=good)
+    assert [(r.estimator, r.success) for r in comparison.rows] == [("before", True), ("bad", False), ("after", True)]
+    assert not comparison.success
+    assert set(comparison.estimates) == {"before", "after"}
+    assert str(error) in comparison.rows[1].message
+    assert strict(comparison.to_json())["rows"][1]["seconds"] is None
+    assert "bad did not succeed" in str(comparison)
+
+
+def test_ctrl_c_is_no_failure_of_an_estimator(good):
+    with pytest.raises(KeyboardInterrupt):
+        compared(good=good, stopped=KeyboardInterrupt())
+
+
+def test_a_window_has_two_rows(good):
+    late = replace(good, mean=0.1 * good.mean, view="delayed")
+    comparison = compared(window=replace(good, delayed=late))
+    assert [(r.estimator, r.view) for r in comparison.rows] == [("window", "realtime"), ("window", "delayed")]
+    assert comparison.rows[1].rmse["position"] == pytest.approx(0.1 * comparison.rows[0].rmse["position"])
+    assert list(comparison.views) == [("window", "realtime"), ("window", "delayed")]
+
+
+def test_estimators_are_announced_before_they_start(good):
+    said: list[str] = []
+    compare(good.problem, good.tracking, {"a": Ready(good), "b": Ready(good)}, announce=said.append)
+    assert said == ["a", "b"]
+
+
+def test_a_tracking_that_does_not_fit_is_refused_at_the_door(good):
+    stranger = pz.Tracking([0.0, 1.0], [1.0, 2.0], ["elsewhere", "elsewhere"])
+    with pytest.raises(ValueError, match="elsewhere"):
+        compare(good.problem, stranger, {"a": Ready(good)})
+
+
+def test_evaluate_alone_gives_the_same_row(good):
+    assert evaluate("good", good) == compared(good=good).rows[0]
+
+
+def test_the_failed_estimators_of_the_registry_have_all_their_views():
+    """A graph that raises has one delayed row, a window two."""
+    scenario = load_scenario("b612-range")
+    tracking = pz.Tracking(scenario.times, np.ones(len(scenario.times)))
+
+    class Broken(pz.FactorGraph):
+        def estimate(self, problem, tracking):
+            raise RuntimeError("no")
+
+    Broken.__module__, Broken.__qualname__ = pz.FactorGraph.__module__, pz.FactorGraph.__qualname__
+    rows = compare(scenario.problem, tracking, {"graph": Broken()}).rows
+    assert [(r.view, r.success) for r in rows] == [("delayed", False)]
+
+
+# ---- how it looks --------------------------------------------------------------------------------------------------------
+
+
+def rendered(comparison: Comparison, width: int) -> str:
+    from rich.console import Console
+
+    console = Console(width=width, color_system=None)
+    with console.capture() as captured:
+        console.print(comparison)
+    return captured.get()
+
+
+@pytest.mark.parametrize("width", [20, 40, 79, 80, 100, 140, 1000])
+def test_no_width_is_exceeded_and_no_number_broken(good, width):
+    comparison = compared(ekf=good, graph=replace(good, mean=0.5 * good.mean, view="delayed"))
+    text = rendered(comparison, width)
+    assert max(map(len, text.splitlines())) <= width
+    value = f"{comparison.rows[0].rmse_last_half['position']:.3f}"
+    assert value in text or width < 40
+
+
+def test_wide_terminals_see_more(good):
+    comparison = compared(ekf=good)
+    assert "whole run" in rendered(comparison, 200)
+    assert "iterations" not in rendered(comparison, 75)
+    assert "position RMSE, last half:" in rendered(comparison, 45)
+
+
+def test_large_errors_are_shown_in_kilometres(good):
+    text = str(compared(ekf=replace(good, mean=1e6 * good.mean, covariance=1e12 * good.covariance)))
+    assert " km " in text
+    assert "e+" not in text
+
+
+def test_sentences_name_the_best_the_dishonest_and_the_lost(good):
+    text = str(
+        compared(
+            honest=good,
+            cautious=replace(good, covariance=100 * good.covariance),
+            wayward=replace(good, mean=100 + good.mean),
+        )
+    )
+    assert "Smallest position error in the last half of the run: honest" in text
+    assert "Errors of honest are about as large as the covariance says" in text
+    assert re.search(r"Errors of cautious are about (9\.\d|1[01]) times smaller than the covariance says", text)
+    assert "wayward diverged" in text
+
+
+def test_html_escapes_what_users_wrote(good):
+    page = compare(good.problem, good.tracking, {"<script>alert(1)</script>": Ready(good)})._repr_html_()
+    assert "<script>" not in page
+    assert "&lt;script&gt;" in page
+    assert page.count("<tr>") == 2

@@ -1,0 +1,230 @@
+"""Pictures: every function draws what it was given on the axes it was given, and whole pages can be saved."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Ellipse
+from numpy.testing import assert_allclose
+
+import piazzi as pz
+from piazzi.evaluate import Comparison, compare
+from piazzi.present.figures import error_overlay, innovations, measurements, orbit, position_at, state_error
+from piazzi.present.figures.errors import claim_overlay
+from piazzi.present.figures.pages import pages, save
+from piazzi.present.figures.style import COLOURS, MOST_POINTS, colour_of, drawn, line_of
+from piazzi.scenarios import load_scenario
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    scenario = load_scenario("b612-range")
+    tracking = pz.simulate(scenario.problem, scenario.times, np.random.default_rng(0))
+    estimators = {"ekf": pz.ExtendedKalmanFilter(), "window:20": pz.SlidingWindow(lag=20)}
+    return compare(scenario.problem, tracking, estimators)
+
+
+@pytest.fixture
+def ax():
+    return Figure().subplots()
+
+
+@pytest.fixture
+def ekf(comparison):
+    return comparison.estimates["ekf"]
+
+
+def whole(ax, patch) -> bool:
+    """Whether the patch is within the limits of its axes."""
+    box = patch.get_path().transformed(patch.get_patch_transform()).get_extents()
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    return left <= box.x0 and box.x1 <= right and bottom <= box.y0 and box.y1 <= top
+
+
+def test_orbit_shows_planet_path_truth_and_whole_ellipses(ax, ekf):
+    assert orbit(ax, ekf, name="ekf", planet_radius=10.0) is ax
+    (planet,) = [p for p in ax.patches if isinstance(p, Circle)]
+    assert planet.radius == 10
+    ellipses = [p for p in ax.patches if isinstance(p, Ellipse) and not isinstance(p, Circle)]
+    assert len(ellipses) == 9
+    assert all(whole(ax, p) for p in (planet, *ellipses))
+    labels = [line.get_label() for line in ax.lines]
+    assert labels[:2] == ["truth", "ekf"]
+    assert_allclose(ax.lines[1].get_xydata(), ekf.mean[:, :2])
+    assert ax.get_aspect() == 1
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "y [m]")
+
+
+def test_an_ellipse_is_the_curve_of_three_sigma(ax, ekf):
+    orbit(ax, ekf, ellipses=1)
+    (patch,) = [p for p in ax.patches if isinstance(p, Ellipse) and not isinstance(p, Circle)]
+    curve = patch.get_patch_transform().transform(patch.get_path().vertices[:-1]) - ekf.mean[0, :2]
+    distance = np.einsum("ki,ki->k", curve, np.linalg.solve(ekf.covariance[0, :2, :2], curve.T).T)
+    on_curve = distance[::3]  # ends of the Bezier pieces
+    assert_allclose(on_curve, 9.0, rtol=1e-6)
+
+
+def test_orbits_are_shown_in_kilometres_when_large(ax, ekf):
+    large = replace(ekf, mean=1e6 * ekf.mean, tracking=replace(ekf.tracking, truth=1e6 * ekf.tracking.truth))
+    orbit(ax, large)
+    assert ax.get_xlabel() == "x [km]"
+    assert_allclose(ax.lines[1].get_xdata(), 1e3 * ekf.mean[:, 0])
+
+
+def test_a_model_without_positions_has_no_orbit(ax, ekf):
+    problem = replace(ekf.problem, model=replace(ekf.problem.model, groups={}))
+    with pytest.raises(ValueError, match='group "position"'):
+        orbit(ax, replace(ekf, problem=problem))
+
+
+def test_last_positions_are_relative_to_the_truth(ax, comparison, ekf):
+    position_at(ax, comparison.views)
+    dot = next(line for line in ax.lines if line.get_marker() == "o")
+    assert_allclose(dot.get_xydata()[0], ekf.mean[-1, :2] - ekf.tracking.truth[-1, :2])
+    assert len(ax.patches) == 3  # the filter, and both views of the window
+
+
+def test_errors_lie_in_a_band_of_three_sigma(ax, ekf):
+    state_error(ax, ekf, "vx", name="ekf")
+    (error,) = [line for line in ax.lines if line.get_label() == "error"]
+    assert_allclose(error.get_ydata(), ekf.mean[:, 2] - ekf.tracking.truth[:, 2])
+    upper = max(ax.lines, key=lambda line: np.max(line.get_ydata()))
+    assert_allclose(upper.get_ydata(), 3 * np.sqrt(ekf.covariance[:, 2, 2]))
+    low, high = ax.get_ylim()
+    assert high == -low > np.abs(error.get_ydata()).max()
+    assert ax.get_ylabel() == "error of vx [m/s]"
+
+
+def test_without_truth_there_is_a_band_and_no_error(ax, ekf):
+    state_error(ax, replace(ekf, tracking=replace(ekf.tracking, truth=None)), "x")
+    assert "error" not in [line.get_label() for line in ax.lines]
+    assert ax.collections
+
+
+def test_bands_that_shrink_a_lot_are_drawn_on_a_logarithmic_scale(ax, ekf):
+    shrink = np.geomspace(1e6, 1, len(ekf.mean))[:, None, None]
+    state_error(ax, replace(ekf, covariance=ekf.covariance * shrink), "x")
+    assert ax.get_yscale() == "symlog"
+    assert len(ax.get_yticks()) <= 9
+
+
+def test_an_unknown_state_or_group_is_refused(ax, ekf, comparison):
+    with pytest.raises(ValueError, match="unknown state 'z'; known: x, y, vx, vy"):
+        state_error(ax, ekf, "z")
+    with pytest.raises(ValueError, match="unknown group 'clock'; known: position, velocity"):
+        error_overlay(ax, comparison, "clock")
+
+
+def test_overlay_has_a_line_for_each_view(ax, comparison, ekf):
+    error_overlay(ax, comparison, "position")
+    assert [line.get_label() for line in ax.lines] == ["ekf", "window:20, real time", "window:20, delayed"]
+    length = np.linalg.norm((ekf.mean - ekf.tracking.truth)[:, :2], axis=1)
+    assert_allclose(ax.lines[0].get_ydata(), length)
+    assert ax.get_yscale() == "log"
+
+
+def test_claims_are_the_root_of_the_summed_variances(ax, comparison, ekf):
+    claim_overlay(ax, comparison, "velocity")
+    assert_allclose(ax.lines[0].get_ydata(), np.sqrt(ekf.covariance[:, 2, 2] + ekf.covariance[:, 3, 3]))
+
+
+def test_measurements_are_drawn_in_degrees_and_hours_where_that_suits(ax):
+    scenario = load_scenario("satellite-bearing")
+    bearing = np.linspace(-3, 3, 1441)
+    measurements(ax, scenario.problem, pz.Tracking(scenario.times, bearing))
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("time [h]", "bearing [deg]")
+    assert_allclose(ax.lines[0].get_ydata(), np.degrees(bearing))
+    assert_allclose(ax.lines[0].get_xdata()[-1], 6.0)
+
+
+def test_innovations_stay_in_sight(ax, ekf):
+    wild = ekf.innovations.copy()
+    wild[5] = 1e6
+    innovations(ax, replace(ekf, innovations=wild), name="ekf")
+    assert ax.get_ylim()[1] < 10
+    (above,) = [line for line in ax.lines if line.get_marker() == "^"]
+    assert len(above.get_xdata()) == 1
+    assert above.get_ydata()[0] < ax.get_ylim()[1]
+
+
+def test_missing_measurements_are_left_out(ax, ekf):
+    values = ekf.tracking.values.copy()
+    values[::2] = np.nan
+    measurements(ax, ekf.problem, replace(ekf.tracking, values=values))
+    assert len(ax.lines[0].get_xdata()) == 50
+
+
+# ---- style ---------------------------------------------------------------------------------------------------------------
+
+
+def test_an_estimator_has_one_colour_whatever_its_options():
+    assert colour_of("window:10") == colour_of("window:100x3") == COLOURS["window"]
+    assert len(set(COLOURS.values())) == len(COLOURS)
+    assert line_of("ekf", "realtime")["color"] == line_of("ekf", "realtime", ("graph", "ekf"))["color"]
+    assert line_of("window:10", "realtime", ("window:5", "window:10")) != line_of(
+        "window:5", "realtime", ("window:5", "window:10")
+    )
+    assert line_of("window:5", "delayed") != line_of("window:5", "realtime")
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of WCAG 2."""
+    channels = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def test_colours_stand_out_from_white_paper():
+    assert all(1.05 / (luminance(c) + 0.05) > 2.0 for c in COLOURS.values())
+
+
+@pytest.mark.parametrize("count", [1, 100, MOST_POINTS, MOST_POINTS + 1, 10**6])
+def test_no_picture_draws_more_points_than_it_can_show(count):
+    shown = len(range(count)[drawn(count)])
+    assert min(count, MOST_POINTS // 2) <= shown <= MOST_POINTS
+
+
+# ---- pages ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
+def test_pages_are_saved_whole_and_the_same_each_time(comparison, tmp_path, kind):
+    found = {}
+    for run in ("one", "two"):
+        (tmp_path / run).mkdir()
+        for name, figure in pages(comparison, title="Costs $5 and more", planet_radius=10.0):
+            path = save(figure, tmp_path / run / f"{name}.{kind}")
+            found.setdefault(name, []).append(path.read_bytes())
+    assert set(found) == {"orbit", "measurements", "errors", "comparison"}
+    assert all(len(one) > 2000 and one == two for one, two in found.values())
+    assert sorted(p.name for p in (tmp_path / "one").iterdir()) == sorted(f"{n}.{kind}" for n in found)
+
+
+def test_pages_need_no_truth(comparison, tmp_path):
+    tracking = replace(comparison.tracking, truth=None)
+    bare = compare(comparison.problem, tracking, {"ekf": pz.ExtendedKalmanFilter()})
+    for name, figure in pages(bare):
+        save(figure, tmp_path / f"{name}.png")
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_one_epoch_makes_pictures(comparison, tmp_path):
+    tracking = pz.Tracking([0.0], [1.0])
+    short = compare(comparison.problem, tracking, {"ekf": pz.ExtendedKalmanFilter()})
+    for name, figure in pages(short, planet_radius=10.0):
+        save(figure, tmp_path / f"{name}.png")
+
+
+def test_estimates_that_are_not_finite_make_pictures(comparison, ekf, tmp_path):
+    mean, covariance = ekf.mean.copy(), ekf.covariance.copy()
+    mean[50:], covariance[50:] = np.nan, np.inf
+    lost = replace(ekf, mean=mean, covariance=covariance)
+    for name, figure in pages(replace(comparison, estimates={"ekf": lost})):
+        save(figure, tmp_path / f"{name}.png")
+
+
+def test_a_picture_ends_in_a_known_format(comparison, tmp_path):
+    with pytest.raises(ValueError, match=r"\.png, \.pdf, \.svg, not '\.gif'"):
+        save(Figure(), tmp_path / "x.gif")
+    assert not list(tmp_path.iterdir())
