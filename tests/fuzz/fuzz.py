@@ -180,12 +180,12 @@ def attempt(target: str, path: Path, problem: pz.Problem | None) -> str:
 
 def run(target: str, minutes: float, seed: int, keep: Path) -> int:
     rng, shapes, bad = random.Random(seed), Counter[str](), 0
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     signal.signal(signal.SIGALRM, lambda *_: (_ for _ in ()).throw(Hung()))
     warnings.simplefilter("error")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         corpus = seeds(target, folder)
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         problem = load_scenario(folder / "csv.toml").problem if target == "csv" else None
         path = folder / f"input.{'toml' if target == 'scenario' else target}"
         slowest, count, end = 0.0, 0, time.monotonic() + 60 * minutes

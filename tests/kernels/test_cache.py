@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 import warnings
 from pathlib import Path
 
@@ -151,6 +152,17 @@ def test_a_failed_build_leaves_nothing(fresh, monkeypatch):
     with pytest.raises(RuntimeError, match="no compiler"):
         cache.load(SMALL)
     assert list(fresh.iterdir()) == []
+
+
+def test_leftovers_of_killed_builds_are_swept_up(fresh, builds):
+    """Old ones: a young one may be another process at work."""
+    for name, age in ((".building-old", 7200), (".damaged-old", 7200), (".building-young", 60)):
+        (fresh / name).mkdir(parents=True)
+        (fresh / name / "kernels.py").touch()
+        os.utime(fresh / name, times=(time.time() - age,) * 2)
+    fresh.chmod(0o700)
+    load_as_a_new_process()
+    assert sorted(p.name for p in fresh.iterdir()) == [".building-young", SMALL.digest()]
 
 
 def test_finished_by_another_process_meanwhile(fresh, builds):
@@ -419,6 +431,7 @@ os.setuid(65534)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root to become another user")
 def test_as_another_user_with_a_read_only_cache(tmp_path):
     """A user who may read a finished cache of his own but not write to it."""

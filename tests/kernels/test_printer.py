@@ -61,7 +61,7 @@ POINTS = st.lists(st.floats(-2, 2).map(lambda v: round(v, 3)), min_size=3, max_s
 
 
 @given(EXPRESSIONS, POINTS)
-@settings(max_examples=150)
+@settings(max_examples=100)
 def test_printed_source_equals_sympy(text, at):
     outputs = with_gradient(to_sympy(text, SYMBOLS))
     wanted = [exact(e, *at) for e in outputs]

@@ -41,8 +41,7 @@ def piazzi() -> None:
     SOURCE is a recording (.npz, .nc, or .csv with --scenario), the name of a built-in scenario, a scenario file (.toml),
     or - for standard input.
 
-    Examples
-    --------
+    Examples:
       piazzi demo -o demo                       a first look: tables and pictures
       piazzi estimate tracking.npz              the orbit, and how sure it is
       piazzi compare b612-range --with ekf --with graph

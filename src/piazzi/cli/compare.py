@@ -32,8 +32,7 @@ def command(
     shows what is left once an estimator has settled.  NEES and NIS measure honesty: near the ideal, errors are as large as
     the covariance says; above it, larger.
 
-    Examples
-    --------
+    Examples:
       piazzi compare tracking.npz
       piazzi compare tracking.npz --with ekf --with window:100 --with graph --json
       piazzi compare b612-range-q0 --seed 7

@@ -30,8 +30,7 @@ def command(folder: str, kind: str, seed: int) -> int:
 
     satellite-bearing is a satellite seen only by its bearing; b612-range a probe around a tiny planet seen only by its range.
 
-    Examples
-    --------
+    Examples:
       piazzi demo
       piazzi demo -o figures --format pdf --seed 3
     """

@@ -41,8 +41,7 @@ def command(
 
     Prints the last state with its standard deviations, and errors and consistency over the run.
 
-    Examples
-    --------
+    Examples:
       piazzi estimate tracking.npz
       piazzi estimate tracking.npz --with window:100 -o orbit.nc
       piazzi estimate rows.csv --scenario b612-range --json

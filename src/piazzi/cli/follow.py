@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import click
@@ -55,7 +56,7 @@ def _sink(stack: ExitStack, output: str | None, written: int) -> IO[bytes]:
     if output in (None, STDIN):
         return sys.stdout.buffer
     assert output is not None
-    file = stack.enter_context(open(output, "r+b" if os.path.exists(output) else "w+b"))
+    file: IO[bytes] = stack.enter_context(Path(output).open("r+b" if os.path.exists(output) else "w+b"))  # noqa: SIM115 (the stack closes it)
     file.truncate(written)
     file.seek(0, os.SEEK_END)
     if file.tell() < written:

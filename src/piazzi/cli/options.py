@@ -47,7 +47,7 @@ class Group(click.Group):
 
 def keep_examples(text: str | None) -> str:
     """Help text that click does not fill where examples begin."""
-    return re.sub(r"\n\nExamples\n-+\n", "\n\n\b\nExamples:\n", inspect.cleandoc(text or ""))
+    return re.sub(r"\n\nExamples:?\n(-+\n)?", "\n\n\b\nExamples:\n", inspect.cleandoc(text or ""))
 
 
 class WithEstimators(Command):

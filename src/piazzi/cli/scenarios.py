@@ -13,8 +13,7 @@ from piazzi.cli.running import BAD_INPUT, DONE
 def command(ctx: click.Context) -> None:
     """List, show and check problems as files.
 
-    Examples
-    --------
+    Examples:
       piazzi scenarios list
       piazzi scenarios show b612-range > mine.toml
       piazzi scenarios check mine.toml

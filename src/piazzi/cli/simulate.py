@@ -27,8 +27,7 @@ def command(source: str, output_file: str | None, as_json: bool, seed: int, scen
 
     A scenario says what is true and when it is measured.  A recording is simulated anew: its problem, at its times.
 
-    Examples
-    --------
+    Examples:
       piazzi simulate b612-range --seed 3 -o tracking.nc
       piazzi simulate my-scenario.toml -o rows.csv
       piazzi simulate b612-range -o - | piazzi estimate - --scenario b612-range

@@ -103,32 +103,21 @@ class FactorGraph:
         Where the iterations fail, once more from a window, then from the prior.  Where the prior turns out too wide for
         covariances, in information form, and from the prior first: a filter cannot have worked.
         """
-        information, given = self.solver == "information", not isinstance(self.start, str)
+        information, name = self.solver == "information", self.start if isinstance(self.start, str) else "given"
         solver: Solver = InformationSolver(chain) if information else CovarianceSolver(chain)
-        waiting, tried, iterations = [s for s in ("window", "prior") if s != self._start_name], [], 0
-        start, failure = self._start_name, ""
-        while True:
-            tried.append(start)
-            states = with_first(chain, self._begin(start, chain.problem, tracking, inputs))
-            widest = np.inf if information else DIFFUSE
-            outcome = optimize(chain, solver, states, self.max_iterations, self.tolerance, widest)
-            iterations += outcome.iterations
-            if outcome.failure == TOO_WIDE:
-                information = self.solver == "auto" and InformationSolver.applies(chain.problem)
-                if not information:
-                    return _too_wide(outcome, self.solver), solver, ", then ".join(tried)
-                solver, tried, waiting = InformationSolver(chain), [], (["given"] if given else []) + ["prior", "window"]
-            elif not outcome.failure:
-                return replace(outcome, iterations=iterations), solver, ", then ".join(tried)
-            else:
-                failure = failure or outcome.failure
-                if not waiting:
-                    return replace(outcome, iterations=iterations, failure=failure), solver, ", then ".join(tried)
+        waiting = [name, *(s for s in ("window", "prior") if s != name)]
+        tried: list[tuple[str, Outcome]] = []
+        while waiting and not (tried and not tried[-1][1].failure):
             start = waiting.pop(0)
-
-    @property
-    def _start_name(self) -> str:
-        return self.start if isinstance(self.start, str) else "given"
+            states = with_first(chain, self._begin(start, chain.problem, tracking, inputs))
+            outcome = optimize(chain, solver, states, self.max_iterations, self.tolerance, np.inf if information else DIFFUSE)
+            tried.append((start, outcome))
+            if outcome.failure == TOO_WIDE:
+                if self.solver == "chain" or not InformationSolver.applies(chain.problem):
+                    return _too_wide(outcome, self.solver), solver, start
+                solver, information, tried = InformationSolver(chain), True, []
+                waiting = [*(["given"] if name == "given" else []), "prior", "window"]
+        return _together(tried), solver, ", then ".join(start for start, _ in tried)
 
     def _begin(self, start: str, problem: Problem, tracking: Tracking, inputs: Inputs) -> Array:
         """States to start from, (K, n)."""
@@ -144,6 +133,17 @@ class FactorGraph:
             return first.delayed.mean
         seen = inputs if start == "ekf" else replace(inputs, z=np.full_like(inputs.z, np.nan))
         return filter_run(problem, seen)[0]
+
+
+def _together(tried: list[tuple[str, Outcome]]) -> Outcome:
+    """The last outcome, with the iterations of all; where that failed too, with what was wrong with each."""
+    last = tried[-1][1]
+    failure = (
+        "; ".join(f"from {start}: {outcome.failure}" for start, outcome in tried)
+        if last.failure and len(tried) > 1
+        else last.failure
+    )
+    return replace(last, iterations=sum(outcome.iterations for _, outcome in tried), failure=failure)
 
 
 def _too_wide(outcome: Outcome, solver: str) -> Outcome:

@@ -96,7 +96,7 @@ def _without_start(chain: Chain) -> Outcome:
     chain.d_pred.fill(np.nan)
     chain.P_pred.fill(np.nan)
     where = f"{chain.problem.model.names[i]!r} is {chain.x[k, i]} from t = {chain.inputs.t[k]:g} s"
-    return Outcome(chain.P_pred, 0, f"the start cannot be used: {where}", {})
+    return Outcome(chain.P_pred, 0, f"it is no start: {where}", {})
 
 
 def _figures(chain: Chain, solver: Solver, costs: list[float]) -> dict[str, Any]:

@@ -24,8 +24,8 @@ class LiveWindow:
     """A sliding window in progress, from ``SlidingWindow(...).start(problem)``.
 
     ``update(station, z, t)`` takes a measurement: of a new time, of the newest epoch, or late but inside the window, where it
-    is taken in its place.  One that is older than the window is refused: `update` returns False and `refused` keeps its time and
-    station.  In order, the numbers are those of ``estimate`` on the whole run.
+    is taken in its place.  One that is older than the window is refused: `update` returns False and `refused` keeps its time
+    and station.  In order, the numbers are those of ``estimate`` on the whole run.
 
     Attributes
     ----------
@@ -323,7 +323,8 @@ class LiveWindow:
         shapes |= {"nu_lin": (J * m,), "H_lin": (J * m, n), "dx": (W, n)} if W else {}
         for name, shape in shapes.items():
             if name not in saved or np.shape(saved[name]) != shape:
-                raise ValueError(f"the checkpoint's {name!r} has shape {np.shape(saved.get(name, ()))}; this problem needs {shape}")
+                found = np.shape(saved.get(name, ()))
+                raise ValueError(f"the checkpoint's {name!r} has shape {found}; this problem needs {shape}")
         for name in _KEPT:
             kind = np.int64 if name in ("count", "first_row", "station") else float
             setattr(self, "_" + name, np.array(saved[name], dtype=kind))

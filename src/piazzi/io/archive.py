@@ -94,5 +94,5 @@ def _header(stream: IO[bytes], key: str) -> tuple[np.dtype[Any], tuple[int, ...]
 
 def _one_line(error: BaseException) -> str:
     """The first line of an error's text, or its kind."""
-    text = (str(error).splitlines() or [""])[0][:200]
+    text = (str(error.args[0] if error.args and isinstance(error.args[0], str) else error).splitlines() or [""])[0][:200]
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text) or type(error).__name__

@@ -95,6 +95,8 @@ def parse_header(first: bytes, line: int) -> list[str]:
     for i, name in enumerate(header):
         if not name:
             raise ValueError(f"line {line}: column {i + 1} has no name")
+        if not name.isprintable() or len(name) > 100:
+            raise ValueError(f"line {line}: column {i + 1} cannot be called {shown(name)}")
         if name in header[:i]:
             raise ValueError(f"line {line}: two columns are called {shown(name)}")
     return header

@@ -92,6 +92,7 @@ def _seal(manifest: dict[str, Any]) -> str:
 def _build(spec: KernelSpec, home: Path) -> dict[str, Any]:
     """Compile in a folder of our own, then move it into place: two processes may do so at once."""
     source = spec.source("compiled")
+    _sweep(home.parent)
     work = Path(tempfile.mkdtemp(prefix=".building-", dir=home.parent))
     try:
         (work / "kernels.py").write_text(source)
@@ -107,6 +108,14 @@ def _build(spec: KernelSpec, home: Path) -> dict[str, Any]:
     finally:
         shutil.rmtree(work, ignore_errors=True)
     return dict(load_objects(objects, symbols))
+
+
+def _sweep(place: Path) -> None:
+    """Remove what builds that were killed left behind: nothing takes an hour to compile."""
+    for leftover in [*place.glob(".building-*"), *place.glob(".damaged-*")]:
+        with contextlib.suppress(OSError):
+            if time.time() - leftover.stat().st_mtime > 3600:
+                shutil.rmtree(leftover, ignore_errors=True)
 
 
 def _move(work: Path, home: Path) -> None:
