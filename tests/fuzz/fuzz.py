@@ -3,11 +3,12 @@
 Mutates good files byte by byte, token by token and line by line; inside archives the members too, with their checksums made
 good again.  Inputs that draw a message of a new shape join the files to mutate, which leads the search deeper.  A reader may
 return or raise ValueError or OSError with one printable line, within seconds and a bounded memory; whatever else happens is
-kept under --keep, with the input.  Not part of the test suite.
+kept under --keep, with the input.  NetCDF files are read in a child process each.  Not part of the test suite.
 """
 
 import argparse
 import io
+import os
 import random
 import re
 import resource
@@ -28,7 +29,24 @@ from piazzi.io import cells, save, save_estimate
 from piazzi.scenarios import check, load_scenario, names, show
 
 SECONDS, MEMORY = 10, 3 * 2**30
-NUMBERS = ["0", "-0.0", "1e999", "-1e308", "nan", "inf", "9" * 400, "1e-320", "0x10", "1_0", "true", "1e", "--1", ".", "1" * 30, "-1"]
+NUMBERS = [
+    "0",
+    "-0.0",
+    "1e999",
+    "-1e308",
+    "nan",
+    "inf",
+    "9" * 400,
+    "1e-320",
+    "0x10",
+    "1_0",
+    "true",
+    "1e",
+    "--1",
+    ".",
+    "1" * 30,
+    "-1",
+]
 TOKENS = {
     "scenario": ["[", "]", "[[", "]]", "{", "}", "=", ",", '"', '"""', "'", "#", "\n", ".", "x", "vx", "length", "length/time", "units = ", "km",
                  "sigma", "variance", "covariance", "state", "truth", "[truth]\n", "[step]\n", "[memory]\n", "role", "estimated", "**", "atan2(",
@@ -61,9 +79,16 @@ def seeds(target: str, folder: Path) -> list[bytes]:
         problem, tracking = pz.load(folder / "csv.toml")
         save(folder / "seed.csv", problem, tracking)
         text = (folder / "seed.csv").read_bytes()
-        return [text, text.replace(b"\n", b"\r\n"), b"# epoch = 2025\n" + text, b"time [min],station,bearing [deg]\n0,n,1\n1,n,\n"]
+        return [
+            text,
+            text.replace(b"\n", b"\r\n"),
+            b"# epoch = 2025\n" + text,
+            b"time [min],station,bearing [deg]\n0,n,1\n1,n,\n",
+        ]
     problem, tracking = pz.load("b612-range" if target == "nc" else "satellite-bearing")
-    problem = pz.Problem(problem.model, problem.prior, problem.process_noise, problem.stations, problem.parameters, problem.integrator)
+    problem = pz.Problem(
+        problem.model, problem.prior, problem.process_noise, problem.stations, problem.parameters, problem.integrator
+    )
     tracking = pz.Tracking(tracking.times[:9], tracking.values[:9], truth=tracking.truth[:9])
     save(folder / f"seed.{target}", problem, tracking)
     out = [(folder / f"seed.{target}").read_bytes()]
@@ -178,6 +203,29 @@ def attempt(target: str, path: Path, problem: pz.Problem | None) -> str:
     return "good"
 
 
+def attempt_in_child(target: str, path: Path, problem: pz.Problem | None) -> str:
+    """The same in a process of its own: the HDF5 library itself may hang or crash, which is counted but not ours to mend."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if not child:
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(SECONDS)
+        try:
+            os.write(writer, attempt(target, path, problem).encode())
+        except BaseException:
+            os.write(writer, b"BAD " + traceback.format_exc().encode()[-2000:])
+        os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        said = pipe.read().decode()
+    _, status = os.waitpid(child, 0)
+    if os.WIFSIGNALED(status):
+        return f"HDF5 ended with {signal.Signals(os.WTERMSIG(status)).name}"
+    if said.startswith("BAD"):
+        raise AssertionError(said)
+    return said
+
+
 def run(target: str, minutes: float, seed: int, keep: Path) -> int:
     rng, shapes, bad = random.Random(seed), Counter[str](), 0
     signal.signal(signal.SIGALRM, lambda *_: (_ for _ in ()).throw(Hung()))
@@ -198,7 +246,7 @@ def run(target: str, minutes: float, seed: int, keep: Path) -> int:
             started = time.process_time()
             signal.setitimer(signal.ITIMER_REAL, 6 * SECONDS)
             try:
-                shape = attempt(target, path, problem)
+                shape = (attempt_in_child if target == "nc" else attempt)(target, path, problem)
             except BaseException as error:
                 if isinstance(error, KeyboardInterrupt):
                     break
@@ -214,6 +262,8 @@ def run(target: str, minutes: float, seed: int, keep: Path) -> int:
                 (keep / f"{target}-{bad}-slow").write_bytes(data)
             slowest, count = max(slowest, spent), count + 1
             shapes[shape] += 1
+            if shape.startswith("HDF5"):
+                (keep / f"{target}-{count}-{shape[-7:]}").write_bytes(data)
             if shapes[shape] == 1 and len(data) < 2**18:
                 corpus.append(data)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -149,12 +149,21 @@ def good(tmp_path):
     return path
 
 
-def attribute(name, value):
-    def change(root):
-        del root.attrs[name]
-        root.attrs[name] = value
+def said(name, change):
+    """Change the JSON of a variable: by a function of its content, or to another text."""
 
-    return change
+    def apply(root):
+        text = root[name][()].tobytes().decode()
+        if callable(change):
+            content = json.loads(text)
+            change(content)
+            text = json.dumps(content)
+        else:
+            text = change
+        del root[name]
+        root[name] = np.frombuffer(text.encode(), dtype="S1")
+
+    return apply
 
 
 def variable(name, value):
@@ -164,15 +173,6 @@ def variable(name, value):
             root[name] = value
 
     return change
-
-
-def in_problem(change):
-    def apply(root):
-        tables = json.loads(root.attrs["problem"])
-        change(tables)
-        root.attrs["problem"] = json.dumps(tables)
-
-    return apply
 
 
 def linked(root):
@@ -200,16 +200,17 @@ def virtual(root):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (attribute("format", "other/1"), "its format is 'other/1'"),
-        (attribute("problem", "{"), "attribute 'problem' is not JSON"),
-        (attribute("problem", "[]"), "attribute 'problem' is not a JSON object"),
-        (attribute("problem", "[" * 100_000), "attribute 'problem' is nested too deep"),
-        (attribute("problem", 3.0), "attribute 'problem' is not text"),
-        (attribute("problem", '{"prior": NaN}'), "holds NaN"),
-        (in_problem(lambda t: t["dynamics"].update(vx="__import__('os')")), "dynamics.vx: column"),
-        (in_problem(lambda t: t["prior"].update(mean=[0, 0, 0, 0])), "no finite value at the prior mean"),
-        (in_problem(lambda t: t.update(more=1)), "more: unknown key"),
-        (in_problem(lambda t: t.pop("prior")), "prior.mean: is missing"),
+        (said("about", lambda a: a.update(format="other/1")), "its format is 'other/1'"),
+        (said("about", lambda a: a.update(epoch=3)), "about.epoch: must be text"),
+        (said("problem", "{"), "variable 'problem' is not JSON"),
+        (said("problem", "[]"), "variable 'problem' is not a JSON object"),
+        (said("problem", "[" * 100_000), "variable 'problem' is nested too deep"),
+        (said("problem", '{"prior": {"mean": NaN}}'), "prior.mean"),
+        (said("problem", lambda t: t["dynamics"].update(vx="__import__('os')")), "dynamics.vx: column"),
+        (said("problem", lambda t: t["prior"].update(mean=[0, 0, 0, 0])), "no finite value at the prior mean"),
+        (said("problem", lambda t: t.update(more=1)), "more: unknown key"),
+        (said("problem", lambda t: t.pop("prior")), "prior.mean: is missing"),
+        (variable("problem", np.ones(3)), "variable 'problem' is not text"),
         (variable("row_time", None), "there is no variable 'row_time'"),
         (variable("row_time", np.array(["a"], dtype="S1")), "variable 'row_time' is not made of real numbers"),
         (variable("row_time", np.arange(100)[::-1].astype(float)), "times must increase"),
@@ -227,9 +228,12 @@ def virtual(root):
             lambda root: variable("mean", np.ones((3, 4)))(root["estimate"]),
             "variable 'mean' has shape (3, 4); it must be (100, 4)",
         ),
-        (lambda root: attribute("view", "sideways")(root["estimate"]), "attribute 'view' is 'sideways'"),
-        (lambda root: attribute("seconds", "x")(root["estimate"]), "attribute 'seconds' is not a finite number"),
-        (lambda root: attribute("iterations", np.nan)(root["estimate"]), "iterations"),
+        (lambda root: said("about", lambda a: a.update(view="sideways"))(root["estimate"]), "about.view: is 'sideways'"),
+        (
+            lambda root: said("about", lambda a: a.update(seconds="x"))(root["estimate"]),
+            "about.seconds: must be a finite number",
+        ),
+        (lambda root: said("about", lambda a: a.pop("iterations"))(root["estimate"]), "lacks the view, the iterations"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_told(good, change, says):

@@ -188,17 +188,19 @@ def test_no_picture_draws_more_points_than_it_can_show(count):
 # ---- pages ---------------------------------------------------------------------------------------------------------------
 
 
+def test_pages_are_saved_whole(comparison, tmp_path):
+    for name, figure in pages(comparison, title="Costs $5 and more", planet_radius=10.0):
+        assert save(figure, tmp_path / f"{name}.png").stat().st_size > 10_000
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["comparison.png", "errors.png", "measurements.png", "orbit.png"]
+
+
 @pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
-def test_pages_are_saved_whole_and_the_same_each_time(comparison, tmp_path, kind):
-    found = {}
-    for run in ("one", "two"):
-        (tmp_path / run).mkdir()
-        for name, figure in pages(comparison, title="Costs $5 and more", planet_radius=10.0):
-            path = save(figure, tmp_path / run / f"{name}.{kind}")
-            found.setdefault(name, []).append(path.read_bytes())
-    assert set(found) == {"orbit", "measurements", "errors", "comparison"}
-    assert all(len(one) > 2000 and one == two for one, two in found.values())
-    assert sorted(p.name for p in (tmp_path / "one").iterdir()) == sorted(f"{n}.{kind}" for n in found)
+def test_a_picture_has_the_same_bytes_each_time(ekf, tmp_path, kind):
+    for name in ("one", "two"):
+        figure = Figure()
+        state_error(figure.subplots(), ekf, "x", name="ekf")
+        save(figure, tmp_path / f"{name}.{kind}")
+    assert (tmp_path / f"one.{kind}").read_bytes() == (tmp_path / f"two.{kind}").read_bytes()
 
 
 def test_pages_need_no_truth(comparison, tmp_path):

@@ -9,19 +9,17 @@ import numpy as np
 
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
-from piazzi.scenarios.write import problem_to_tables
 
 if TYPE_CHECKING:
     import xarray
 
     from piazzi.estimate.estimator import Estimate
 
-FORMAT = "piazzi/1"
 DETAIL = "detail_"
 
 
 def tracking_to_dataset(problem: Problem, tracking: Tracking) -> xarray.Dataset:
-    """Measurements and truth with names and units; the problem is text in an attribute."""
+    """Measurements, and the truth where it is known, with names and units."""
     import xarray as xr
 
     variables = _rows(problem, tracking)
@@ -32,9 +30,9 @@ def tracking_to_dataset(problem: Problem, tracking: Tracking) -> xarray.Dataset:
         {"long_name": "measurements, NaN where missing"},
     )
     if tracking.truth is not None:
-        variables["truth"] = (("time", "true_state"), tracking.truth, {"long_name": "true state"})
-    attributes = {"format": FORMAT, "name": problem.name, "problem": json.dumps(problem_to_tables(problem), allow_nan=False)}
-    return xr.Dataset(variables, coordinates, attributes | {"epoch": tracking.epoch})
+        own = "state" if tracking.truth.shape[1] == problem.model.n else "true_state"
+        variables["truth"] = (("time", own), tracking.truth, {"long_name": "true state"})
+    return xr.Dataset(variables, coordinates, {"title": _label(problem.name)})
 
 
 def estimate_to_dataset(estimate: Estimate) -> xarray.Dataset:
@@ -54,18 +52,19 @@ def estimate_to_dataset(estimate: Estimate) -> xarray.Dataset:
     variables["innovation_covariance"] = (("row", "component", "component_2"), estimate.innovation_covariances)
     if tracking.truth is not None and tracking.truth.shape[1] == len(names):
         variables["truth"] = (("time", "state"), tracking.truth, {"long_name": "true state"})
-    plain = {}
     for key, value in estimate.details.items():
         if isinstance(value, np.ndarray):
             variables[DETAIL + key] = (tuple(f"{key}_{i}" for i in range(value.ndim)), value)
-        else:
-            plain[key] = _plain(value, key)
     attributes = {
         "view": estimate.view, "iterations": int(estimate.iterations), "seconds": float(estimate.seconds),
-        "success": int(estimate.success), "message": estimate.message, "failure": estimate.failure,
-        "details": json.dumps(plain),
+        "success": int(estimate.success), "message": _label(estimate.message), "details": json.dumps(plain_details(estimate)),
     }  # fmt: skip
     return xr.Dataset(variables, coordinates | {"state_2": ("state_2", names)}, attributes)
+
+
+def plain_details(estimate: Estimate) -> dict[str, Any]:
+    """The details that are no arrays, as JSON keeps them; raises ValueError for one that it cannot keep."""
+    return {key: _plain(value, key) for key, value in estimate.details.items() if not isinstance(value, np.ndarray)}
 
 
 def _rows(problem: Problem, tracking: Tracking) -> dict[str, Any]:
@@ -73,7 +72,7 @@ def _rows(problem: Problem, tracking: Tracking) -> dict[str, Any]:
     index = tracking.stations_of(problem).astype(np.int32)
     return {
         "row_time": ("row", tracking.row_times, {"units": "s"}),
-        "row_station": ("row", index, {"long_name": "index into station", "named": int(tracking.row_stations is not None)}),
+        "row_station": ("row", index, {"long_name": "index into station"}),
     }
 
 
@@ -100,6 +99,11 @@ def _epochs(problem: Problem, tracking: Tracking) -> dict[str, Any]:
         "state": ("state", np.array(names, dtype=object)),
         "unit": ("state", units, {"long_name": "unit of each state"}),
     }
+
+
+def _label(text: str) -> str:
+    """A text that any attribute can hold."""
+    return text.replace("\0", " ")
 
 
 def _plain(value: Any, key: str) -> Any:

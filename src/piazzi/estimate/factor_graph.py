@@ -101,7 +101,8 @@ class FactorGraph:
         """Optimise from the start asked for; the outcome, its solver, and the starts used.
 
         Where the iterations fail, once more from a window, then from the prior.  Where the prior turns out too wide for
-        covariances, in information form, and from the prior first: a filter cannot have worked.
+        covariances, in information form, and from the prior first: a filter cannot have worked.  Where the filter behind the
+        start was wrong about its errors, from the prior too: it may have led to another solution of the same measurements.
         """
         information, name = self.solver == "information", self.start if isinstance(self.start, str) else "given"
         solver: Solver = InformationSolver(chain) if information else CovarianceSolver(chain)
@@ -109,30 +110,63 @@ class FactorGraph:
         tried: list[tuple[str, Outcome]] = []
         while waiting and not (tried and not tried[-1][1].failure):
             start = waiting.pop(0)
-            states = with_first(chain, self._begin(start, chain.problem, tracking, inputs))
-            outcome = optimize(chain, solver, states, self.max_iterations, self.tolerance, np.inf if information else DIFFUSE)
+            states, doubtful = self._begin(start, chain.problem, tracking, inputs)
+            outcome = optimize(
+                chain,
+                solver,
+                with_first(chain, states),
+                self.max_iterations,
+                self.tolerance,
+                np.inf if information else DIFFUSE,
+            )
             tried.append((start, outcome))
             if outcome.failure == TOO_WIDE:
                 if self.solver == "chain" or not InformationSolver.applies(chain.problem):
                     return _too_wide(outcome, self.solver), solver, start
                 solver, information, tried = InformationSolver(chain), True, []
                 waiting = [*(["given"] if name == "given" else []), "prior", "window"]
-        return _together(tried), solver, ", then ".join(start for start, _ in tried)
+        outcome, used = _together(tried), ", then ".join(start for start, _ in tried)
+        if doubtful and not outcome.failure:
+            states, _ = self._begin("prior", chain.problem, tracking, inputs)
+            outcome, better = self._challenge(chain, solver, outcome, with_first(chain, states))
+            used = "prior" if better else used
+        return outcome, solver, used
 
-    def _begin(self, start: str, problem: Problem, tracking: Tracking, inputs: Inputs) -> Array:
-        """States to start from, (K, n)."""
+    def _challenge(self, chain: Chain, solver: Solver, outcome: Outcome, states: Array) -> tuple[Outcome, bool]:
+        """The outcome, or that from other states where its cost is lower, and whether it is; the chain is left there."""
+        x = chain.x.copy()
+        other = optimize(chain, solver, states, self.max_iterations, self.tolerance)
+        iterations = outcome.iterations + other.iterations
+        if not other.failure and other.details["cost"] < outcome.details["cost"] - 1e-6:
+            return replace(other, iterations=iterations), True
+        chain.x[:] = x
+        chain.linearize()
+        solver.solve(0.0)
+        return replace(outcome, iterations=iterations), False
+
+    def _begin(self, start: str, problem: Problem, tracking: Tracking, inputs: Inputs) -> tuple[Array, bool]:
+        """States to start from, (K, n), and whether the filter that they come from was wrong about its errors."""
         K, n = len(tracking.times), problem.model.n
         if start == "given":
             states = numeric(self.start, "start")
             if states.shape != (K, n) or not np.isfinite(states).all():
                 raise ValueError(f"start has shape {states.shape}; it must be ({K}, {n}), and finite")
-            return states
+            return states, False
         if start == "window":
             first = SlidingWindow().estimate(problem, tracking)
             assert first.delayed is not None
-            return first.delayed.mean
+            return first.delayed.mean, inconsistent(first.innovations, first.innovation_covariances)
         seen = inputs if start == "ekf" else replace(inputs, z=np.full_like(inputs.z, np.nan))
-        return filter_run(problem, seen)[0]
+        mean, _, nu, S, *_ = filter_run(problem, seen)
+        return mean, inconsistent(nu, S)
+
+
+def inconsistent(innovations: Array, covariances: Array) -> bool:
+    """Whether innovations are larger than their covariances allow, by five standard deviations of chi-square."""
+    with np.errstate(all="ignore"):
+        squared = innovations**2 / np.diagonal(covariances, axis1=1, axis2=2)
+    there = squared[~np.isnan(squared)]
+    return bool(there.sum() > there.size + 5 * np.sqrt(2 * there.size))
 
 
 def _together(tried: list[tuple[str, Outcome]]) -> Outcome:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -174,11 +174,9 @@ def sentences(comparison: Comparison) -> list[str]:
 
 def _without_truth(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
     expected = expected_nis(comparison)
-    out = ["There is no truth to compare with, so errors are unknown."]
-    for r in rows:
-        if r.mean_nis is not None and expected:
-            out.append(f"Innovations of {r.estimator} are {_times_as_large(sigma_factor(r.mean_nis, expected))} (NIS).")
-    return out
+    factors = {_named(r, rows): sigma_factor(r.mean_nis, expected) for r in rows if r.mean_nis is not None and expected}
+    claims = [f"Innovations of {names} are {claim} (NIS)." for claim, names in _by_claim(factors).items()]
+    return ["There is no truth to compare with, so errors are unknown.", *claims]
 
 
 def _best(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
@@ -195,12 +193,23 @@ def _best(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
 
 def _honest(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
     n = comparison.problem.model.n
-    by_claim: dict[str, list[str]] = {}
-    for r in rows:
-        if r.mean_nees_last_half is not None and np.isfinite(r.mean_nees_last_half):
-            view = f" ({_VIEW.get(r.view, r.view)})" if sum(o.estimator == r.estimator for o in rows) > 1 else ""
-            by_claim.setdefault(_times_as_large(sigma_factor(r.mean_nees_last_half, n)), []).append(r.estimator + view)
-    return [f"Errors of {_list(names)} are {claim} (NEES of this one run)." for claim, names in by_claim.items()]
+    nees = {_named(r, rows): r.mean_nees_last_half for r in rows}
+    factors = {name: sigma_factor(v, n) for name, v in nees.items() if v is not None and np.isfinite(v)}
+    return [f"Errors of {names} are {claim} (NEES of this one run)." for claim, names in _by_claim(factors).items()]
+
+
+def _named(row: Row, rows: Sequence[Row]) -> str:
+    """The estimator's name, with the view where it has two."""
+    both = sum(other.estimator == row.estimator for other in rows) > 1
+    return f"{row.estimator} ({_VIEW.get(row.view, row.view)})" if both else row.estimator
+
+
+def _by_claim(factors: Mapping[str, float]) -> dict[str, str]:
+    """What can be said of each factor, with the list of those of whom it can be said."""
+    found: dict[str, list[str]] = {}
+    for name, factor in factors.items():
+        found.setdefault(_times_as_large(factor), []).append(name)
+    return {claim: _list(names) for claim, names in found.items()}
 
 
 def _times_as_large(factor: float) -> str:

@@ -1,7 +1,8 @@
-"""Arrays and text out of an HDF5 file that may be anything: no links are followed, no objects made, nothing absurd is read."""
+"""Arrays and JSON out of an HDF5 file that may be anything: no links are followed, no objects made, nothing absurd is read."""
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +17,6 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 # A data set may hold this much, or this many times its size in the file if that is more
 FREE_BYTES = 64 * 2**20
 EXPANSION = 20
-MAX_TEXT = 2**22
 _DAMAGE = (OSError, KeyError, RuntimeError, TypeError, OverflowError, MemoryError, AttributeError, IndexError, ArithmeticError)
 
 
@@ -73,43 +73,24 @@ def array(group: Any, name: str, *, required: bool = True) -> Array | None:
     return np.asarray(data[()])
 
 
-def texts(group: Any, name: str) -> list[str]:
-    """The texts of a variable."""
-    import h5py
+def document(group: Any, name: str) -> dict[str, Any]:
+    """The JSON object in a variable of characters.
 
+    Strings of variable length and attributes are not read at all: in a damaged file they make the HDF5 library hang.
+    """
     data = _variable(group, name, True)
-    if h5py.check_string_dtype(data.dtype) is None or data.ndim != 1:
-        raise ValueError(f"variable {name!r} is not a list of text")
-    _check_size(data, name, max(data.dtype.itemsize, 16))
-    return [str(value) for value in data.asstr()[()]]
-
-
-def text(group: Any, name: str, default: str | None = None) -> str:
-    """A text attribute."""
-    value = _attribute(group, name, default)
-    if isinstance(value, bytes):
-        value = value.decode("utf-8")
-    if not isinstance(value, str) or len(value) > MAX_TEXT:
-        raise ValueError(f"attribute {name!r} is not text")
+    if data.dtype != np.dtype("S1") or data.ndim != 1:
+        raise ValueError(f"variable {name!r} is not text")
+    _check_size(data, name, 1)
+    try:
+        value = json.loads(np.asarray(data[()]).tobytes().decode("ascii"))
+    except RecursionError:
+        raise ValueError(f"variable {name!r} is nested too deep") from None
+    except ValueError as error:
+        raise ValueError(f"variable {name!r} is not JSON: {error}") from None
+    if not isinstance(value, dict):
+        raise ValueError(f"variable {name!r} is not a JSON object")
     return value
-
-
-def number(group: Any, name: str) -> float:
-    """An attribute that is one finite number."""
-    value = np.asarray(_attribute(group, name, None))
-    if value.size != 1 or value.dtype.kind not in "iuf" or not np.isfinite(value).all():
-        raise ValueError(f"attribute {name!r} is not a finite number")
-    return float(value.reshape(-1)[0])
-
-
-def _attribute(group: Any, name: str, default: str | None) -> Any:
-    if name not in group.attrs:
-        if default is None:
-            raise ValueError(f"there is no attribute {name!r}")
-        return default
-    if group.attrs.get_id(name).get_storage_size() > MAX_TEXT:
-        raise ValueError(f"attribute {name!r} is absurdly large")
-    return group.attrs[name]
 
 
 def _member(group: Any, name: str) -> Any | None:

@@ -1,52 +1,47 @@
 """The native format: a problem, its measurements and an estimate in one labelled NetCDF-4 file, bit for bit.
 
-The root group holds the tracking, with the problem as JSON text in the attribute `problem`; the groups `estimate` and
-`delayed` hold an estimate.  Any NetCDF reader shows them with names and units.
+The root group holds the tracking, the groups `estimate` and `delayed` an estimate; any NetCDF reader shows them with names and
+units.  What is no array is JSON, in variables of characters: `about` in every group, and `problem`, which has the tables of a
+scenario file in SI units.
 """
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
 from piazzi.estimate import Estimate
-from piazzi.estimate.dataset import DETAIL, FORMAT, estimate_to_dataset, tracking_to_dataset
+from piazzi.estimate.dataset import DETAIL, estimate_to_dataset, plain_details, tracking_to_dataset
 from piazzi.estimate.estimator import View
 from piazzi.io import hdf5
 from piazzi.io.atomic import atomic_path
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
-from piazzi.scenarios.faults import shown
-from piazzi.scenarios.write import problem_from_tables
+from piazzi.scenarios.faults import Faults, shown
+from piazzi.scenarios.table import Table
+from piazzi.scenarios.write import problem_from_tables, problem_to_tables
 
 if TYPE_CHECKING:
     import xarray
 
+FORMAT = "piazzi/1"
+
 
 def write_netcdf(path: str | os.PathLike[str], problem: Problem, tracking: Tracking) -> None:
     """Write a problem and its measurements such that `read_netcdf` gives them back bit for bit; raises OSError, ValueError."""
-    dataset = tracking_to_dataset(problem, tracking)
-    with atomic_path(path) as work:
-        _put(dataset, work, None)
+    _write(path, {"/": _root(problem, tracking)})
 
 
 def write_estimate(path: str | os.PathLike[str], estimate: Estimate) -> None:
     """Write an estimate with all it was made from, such that `read_estimate` gives it back; raises OSError, ValueError."""
-    groups = {None: tracking_to_dataset(estimate.problem, estimate.tracking), "estimate": estimate_to_dataset(estimate)}
+    groups = {"/": _root(estimate.problem, estimate.tracking), "estimate": _group(estimate)}
     if estimate.delayed is not None:
-        groups["delayed"] = estimate_to_dataset(estimate.delayed)
-    with atomic_path(path) as work:
-        for group, dataset in groups.items():
-            _put(dataset, work, group)
-
-
-def _put(dataset: xarray.Dataset, path: Any, group: str | None) -> None:
-    # no fill values: NaN already says what is missing, and integers have none missing
-    encoding = {name: {"_FillValue": None} for name in dataset.variables}
-    dataset.to_netcdf(path, mode="w" if group is None else "a", group=group, engine="h5netcdf", encoding=encoding)
+        groups["delayed"] = _group(estimate.delayed)
+    _write(path, groups)
 
 
 def read_netcdf(path: str | os.PathLike[str]) -> tuple[Problem, Tracking]:
@@ -74,39 +69,87 @@ def read_estimate(path: str | os.PathLike[str]) -> Estimate:
         return _estimate(group, problem, tracking, delayed)
 
 
+# ---- writing -----------------------------------------------------------------------------------------------------------
+
+
+def _root(problem: Problem, tracking: Tracking) -> xarray.Dataset:
+    named = tracking.row_stations is not None
+    about = {"format": FORMAT, "name": problem.name, "epoch": tracking.epoch, "stations_named": named}
+    return _with_json(tracking_to_dataset(problem, tracking), about=about, problem=problem_to_tables(problem))
+
+
+def _group(estimate: Estimate) -> xarray.Dataset:
+    about = {
+        "view": estimate.view, "iterations": int(estimate.iterations), "seconds": float(estimate.seconds),
+        "failure": estimate.failure, "details": plain_details(estimate),
+    }  # fmt: skip
+    return _with_json(estimate_to_dataset(estimate), about=about)
+
+
+def _with_json(dataset: xarray.Dataset, **documents: Mapping[str, Any]) -> xarray.Dataset:
+    texts = {name: np.frombuffer(json.dumps(content).encode("ascii"), dtype="S1") for name, content in documents.items()}
+    return dataset.assign({name: (f"{name}_characters", text) for name, text in texts.items()})
+
+
+def _write(path: str | os.PathLike[str], groups: Mapping[str, xarray.Dataset]) -> None:
+    with atomic_path(path) as work:
+        for group, dataset in groups.items():
+            # no fill values: NaN already says what is missing, and integers have none missing
+            encoding = {name: {"_FillValue": None} for name in dataset.variables}
+            mode: Any = "w" if group == "/" else "a"
+            dataset.to_netcdf(work, mode=mode, group=group, engine="h5netcdf", encoding=encoding)
+
+
+# ---- reading -----------------------------------------------------------------------------------------------------------
+
+
 def _content(root: Any) -> tuple[Problem, Tracking]:
-    found = hdf5.text(root, "format", "")
-    if found != FORMAT:
-        raise ValueError(f"its format is {found[:40]!r}; Piazzi reads {FORMAT!r}")
-    problem = problem_from_tables(_json(root, "problem"), hdf5.text(root, "name", ""), "attribute 'problem'")
+    faults = Faults()
+    about = Table(hdf5.document(root, "about"), "about", faults)
+    if about.text("format") != FORMAT:
+        raise ValueError(f"its format is {shown(about.raw('format'))}; Piazzi reads {FORMAT!r}")
+    name, epoch, named = about.text("name", ""), about.text("epoch", ""), about.flag("stations_named", False)
+    _raise_first(faults)
+    problem = problem_from_tables(hdf5.document(root, "problem"), name or "", "variable 'problem'")
     times, values, truth = hdf5.array(root, "row_time"), hdf5.array(root, "value"), hdf5.array(root, "truth", required=False)
-    return problem, Tracking(times, values, _stations(root), truth, hdf5.text(root, "epoch", ""))
+    stations = _stations(root, problem) if named else None
+    return problem, Tracking(times, values, stations, truth, epoch or "")
 
 
-def _stations(root: Any) -> Any:
-    """Station of every row, None where the tracking does not name it."""
-    index, names = hdf5.array(root, "row_station"), hdf5.texts(root, "station")
+def _stations(root: Any, problem: Problem) -> Array:
+    """Station of every row."""
+    index = hdf5.array(root, "row_station")
+    names = [s.name for s in problem.stations]
     assert index is not None
     sound = index.dtype.kind in "iu" and index.ndim == 1 and index.size and names
     if not (sound and 0 <= index.min() <= index.max() < len(names)):
-        raise ValueError(f"variable 'row_station' does not hold indices into the {len(names)} stations")
-    return np.array(names)[index] if hdf5.number(root["row_station"], "named") else None
+        raise ValueError(f"variable 'row_station' does not hold indices into the {len(names)} stations of the problem")
+    return np.array(names)[index]
 
 
 def _estimate(group: Any, problem: Problem, tracking: Tracking, delayed: Estimate | None) -> Estimate:
     J, K, n = len(tracking.row_times), len(tracking.times), problem.model.n
     m = _shaped(group, "innovation", (J, None)).shape[1]
-    details, view = _json(group, "details"), hdf5.text(group, "view")
+    faults = Faults()
+    about = Table(hdf5.document(group, "about"), "about", faults)
+    view, failure = about.text("view", choices=get_args(View)), about.text("failure", "")
+    iterations, seconds = about.number("iterations"), about.number("seconds")
+    details = dict(about.table("details").data)
+    _raise_first(faults)
+    if view is None or iterations is None or seconds is None:
+        raise ValueError("variable 'about' lacks the view, the iterations or the seconds of the estimate")
     details |= {key.removeprefix(DETAIL): hdf5.array(group, key) for key in group if key.startswith(DETAIL)}
-    if view not in get_args(View):
-        raise ValueError(f"attribute 'view' is {shown(view)}; it must be one of {', '.join(get_args(View))}")
     return Estimate(
         problem, tracking,
         _shaped(group, "mean", (K, n)), _shaped(group, "covariance", (K, n, n)),
         _shaped(group, "innovation", (J, m)), _shaped(group, "innovation_covariance", (J, m, m)),
-        int(hdf5.number(group, "iterations")), hdf5.number(group, "seconds"),
-        cast(View, view), delayed, details, hdf5.text(group, "failure", ""),
+        int(iterations), seconds, cast(View, view), delayed, details, failure or "",
     )  # fmt: skip
+
+
+def _raise_first(faults: Faults) -> None:
+    if faults:
+        raise ValueError(f"in variable {faults[0]}")
 
 
 def _shaped(group: Any, name: str, shape: tuple[int | None, ...]) -> Array:
@@ -117,20 +160,3 @@ def _shaped(group: Any, name: str, shape: tuple[int | None, ...]) -> Array:
     if wanted != value.shape or len(wanted) != len(shape):
         raise ValueError(f"variable {name!r} has shape {value.shape}; it must be {shape}")
     return np.array(value, dtype=float)
-
-
-def _json(group: Any, name: str) -> dict[str, Any]:
-    """The table in a text attribute."""
-    try:
-        value = json.loads(hdf5.text(group, name), parse_constant=_no_constant if name == "problem" else None)
-    except RecursionError:
-        raise ValueError(f"attribute {name!r} is nested too deep") from None
-    except json.JSONDecodeError as error:
-        raise ValueError(f"attribute {name!r} is not JSON: {error}") from None
-    if not isinstance(value, dict):
-        raise ValueError(f"attribute {name!r} is not a JSON object")
-    return value
-
-
-def _no_constant(text: str) -> Any:
-    raise ValueError(f"attribute 'problem' holds {text}, which is no number")

@@ -102,10 +102,11 @@ def measurement_page(comparison: Comparison) -> Figure:
         top, bottom = axes[2 * column : 2 * column + 2]
         measurements(top, comparison.problem, comparison.tracking, column).label_outer()
         top.set_title("Measurements")
-        if len(comparison.problem.stations) > 1:
-            top.legend(loc="upper right", ncols=4)
         innovations(bottom, estimate, column, name=name).label_outer()
         bottom.set_title(f"Innovations of {plain(name)} within 3 sigma")
+    if len(comparison.problem.stations) > 1:
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=6, markerscale=4)
     return figure
 
 

@@ -118,5 +118,11 @@ def _logarithmic(ax: Axes, threshold: float, largest: float) -> None:
 
 
 def plain_ticks(ax: Axes) -> None:
-    """Numbers such as 0.01 and 1000 on a logarithmic axis, instead of powers of ten."""
+    """Numbers such as 0.01 and 1000 on a logarithmic axis; 2 and 5 between them where it is less than two decades long."""
+
+    def between(value: float, _: float) -> str:
+        low, high = ax.get_ylim()
+        return f"{value:g}" if high < 100 * low and f"{value:.0e}"[0] in "25" else ""
+
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    ax.yaxis.set_minor_formatter(between)
