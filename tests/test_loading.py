@@ -14,7 +14,7 @@ from tests.references.drawn import same_problem, same_tracking
 
 
 def test_a_scenario_is_simulated_with_its_seed():
-    problem, tracking = pz.load("b612-range", seed=5)
+    _, tracking = pz.load("b612-range", seed=5)
     assert same_tracking(tracking, pz.load("b612-range", seed=5)[1])
     assert not same_tracking(tracking, pz.load("b612-range", seed=6)[1])
     assert same_tracking(pz.load("b612-range")[1], pz.load("b612-range", seed=0)[1])
@@ -72,7 +72,8 @@ import sys, time, numpy
 started = time.process_time()
 from piazzi import load
 load({str(tmp_path / "a.npz")!r})
-print(time.process_time() - started, *[m for m in ("sympy", "numba", "llvmlite", "pandas", "xarray", "h5py") if m in sys.modules])
+heavy = ("sympy", "numba", "llvmlite", "pandas", "xarray", "h5py")
+print(time.process_time() - started, *[m for m in heavy if m in sys.modules])
 """
     seconds, *heavy = min(
         (

@@ -48,19 +48,99 @@ NUMBERS = [
     "-1",
 ]
 TOKENS = {
-    "scenario": ["[", "]", "[[", "]]", "{", "}", "=", ",", '"', '"""', "'", "#", "\n", ".", "x", "vx", "length", "length/time", "units = ", "km",
-                 "sigma", "variance", "covariance", "state", "truth", "[truth]\n", "[step]\n", "[memory]\n", "role", "estimated", "**", "atan2(",
-                 "__import__('os')", "é", "\x00", "\\u0000", "1979-05-27", "a." * 50, "[" * 2000, "(" * 2000, "9**9**9**9", "max_step", "list"],
-    "csv": [",", "\n", ",,", '"', "#", "\r", "\r\n", "time", "station", "west", "truth:x", "[deg]", "[", "\x00", "é", "\ufeff", " ", "\t", "epoch = "],
-    "npz": ["PK\x03\x04", "PK\x05\x06", "\x93NUMPY", "descr", "fortran_order", "shape", "<f8", "|O", ">f4", "<U9", "(", ")", "True", ".npy"],
+    "scenario": [
+        "[",
+        "]",
+        "[[",
+        "]]",
+        "{",
+        "}",
+        "=",
+        ",",
+        '"',
+        '"""',
+        "'",
+        "#",
+        "\n",
+        ".",
+        "x",
+        "vx",
+        "length",
+        "length/time",
+        "units = ",
+        "km",
+        "sigma",
+        "variance",
+        "covariance",
+        "state",
+        "truth",
+        "[truth]\n",
+        "[step]\n",
+        "[memory]\n",
+        "role",
+        "estimated",
+        "**",
+        "atan2(",
+        "__import__('os')",
+        "é",
+        "\x00",
+        "\\u0000",
+        "1979-05-27",
+        "a." * 50,
+        "[" * 2000,
+        "(" * 2000,
+        "9**9**9**9",
+        "max_step",
+        "list",
+    ],
+    "csv": [
+        ",",
+        "\n",
+        ",,",
+        '"',
+        "#",
+        "\r",
+        "\r\n",
+        "time",
+        "station",
+        "west",
+        "truth:x",
+        "[deg]",
+        "[",
+        "\x00",
+        "é",
+        "\ufeff",
+        " ",
+        "\t",
+        "epoch = ",
+    ],
+    "npz": [
+        "PK\x03\x04",
+        "PK\x05\x06",
+        "\x93NUMPY",
+        "descr",
+        "fortran_order",
+        "shape",
+        "<f8",
+        "|O",
+        ">f4",
+        "<U9",
+        "(",
+        ")",
+        "True",
+        ".npy",
+    ],
     "nc": ["\x89HDF\r\n\x1a\n", "SNOD", "TREE", "HEAP", "OHDR", "FRHP", "BTHD", "problem", "value"],
-}  # fmt: skip
+}
 CSV = """
 states = ["x", "v"]
 dynamics = { x = "v", v = "0" }
 sensors.radar.components = { range = "x", rate = "v" }
 sensors.camera.components = { bearing = { equation = "x", unit = "rad" } }
-stations = [{ name = "west", sensor = "radar", noise = { sigma = [1, 1] } }, { name = "n", sensor = "camera", noise = { sigma = 1 } }]
+stations = [
+  { name = "west", sensor = "radar", noise = { sigma = [1, 1] } },
+  { name = "n", sensor = "camera", noise = { sigma = 1 } },
+]
 prior = { mean = [1, 0], sigma = [1, 1] }
 times = { step = 1, count = 5 }
 """
@@ -159,9 +239,11 @@ def repacked(data: bytes, rng: random.Random, others: list[bytes]) -> bytes:
         warnings.simplefilter("ignore")
         for name, content in members.items():
             if rng.random() < 0.4:
-                content = invented(rng) if rng.random() < 0.6 else changed(bytearray(content), rng, "npz", [content])
+                other = invented(rng) if rng.random() < 0.6 else changed(bytearray(content), rng, "npz", [content])
+            else:
+                other = content
             if rng.random() > 0.03:
-                new.writestr(name, content)
+                new.writestr(name, other)
     return out.getvalue()
 
 
@@ -268,7 +350,8 @@ def run(target: str, minutes: float, seed: int, keep: Path) -> int:
                 corpus.append(data)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(
-        f"{target}: {count} inputs in {minutes:g} minutes, {len(shapes)} different outcomes, {shapes['good']} read as good, {bad} bad; "
+        f"{target}: {count} inputs in {minutes:g} minutes, {len(shapes)} different outcomes, "
+        f"{shapes['good']} read as good, {bad} bad; "
         f"slowest {slowest:.2f} s CPU, peak memory {peak:.0f} MB"
     )
     for shape, times in shapes.most_common(12):

@@ -56,8 +56,16 @@ def test_one_station_needs_no_column_and_angles_may_be_in_degrees(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", [GOOD.replace("\n", "\r\n"), "\ufeff" + GOOD, GOOD.rstrip("\n"), GOOD + "\n\n", "# a remark\n\n" + GOOD, GOOD.replace("west", ' "west"'[1:])]
-)  # fmt: skip
+    "text",
+    [
+        GOOD.replace("\n", "\r\n"),
+        "\ufeff" + GOOD,
+        GOOD.rstrip("\n"),
+        GOOD + "\n\n",
+        "# a remark\n\n" + GOOD,
+        GOOD.replace("west", ' "west"'[1:]),
+    ],
+)
 def test_harmless_variants_are_the_same(tmp_path, text):
     assert same_tracking(read(tmp_path, text), read(tmp_path, GOOD))
 
@@ -163,10 +171,10 @@ def test_every_double_survives(tmp_path):
         ("time,station,range\n0,west," + "1" * 200_000 + "x\n", "line 2: field larger than field limit"),
         (",".join(f"c{i}" for i in range(2000)), "there are 2000 columns"),
     ],
-)  # fmt: skip
+)
 def test_faults_are_told_with_their_line(tmp_path, text, says):
     for size in (0, 2**19):  # the fast way and the careful one must tell the same
-        with pytest.MonkeyPatch.context() as patch, pytest.raises(ValueError, match="a.csv: ") as error:
+        with pytest.MonkeyPatch.context() as patch, pytest.raises(ValueError, match=r"a\.csv: ") as error:
             patch.setattr(cells, "SMALL", size)
             read(tmp_path, text)
         assert says in str(error.value)

@@ -239,7 +239,7 @@ def virtual(root):
 def test_what_is_wrong_in_a_file_is_told(good, change, says):
     with h5py.File(good, "r+") as root:
         change(root)
-    with pytest.raises(ValueError, match="good.nc: ") as error:
+    with pytest.raises(ValueError, match=r"good\.nc: ") as error:
         load_estimate(good)
     assert says in str(error.value)
     assert str(error.value).isprintable()
@@ -258,7 +258,7 @@ def test_other_files_are_told(tmp_path, content, says):
 def test_truncated_files_are_told(good, cut):
     content = good.read_bytes()
     good.write_bytes(content[: int(cut * len(content)) if isinstance(cut, float) else cut])
-    with pytest.raises(ValueError, match="good.nc: "):
+    with pytest.raises(ValueError, match=r"good\.nc: "):
         load_estimate(good)
 
 

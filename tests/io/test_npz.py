@@ -20,9 +20,14 @@ from piazzi.io.npz import read_npz
 from tests.references.drawn import covariances, same_bits, same_problem, same_tracking
 
 GOOD = {
-    "R": 1.2e-5, "Q": np.diag([0.01, 0.01, 0.0025, 0.0025]), "dt": 15, "meas": np.linspace(1.5, 1.2, 20),
-    "x0": np.array([0, 2e7, 4500, 0]), "P0": np.diag([1e12, 9e12, 6.4e5, 6.4e5]), "truth": np.ones((20, 4)) * 2e7,
-}  # fmt: skip
+    "R": 1.2e-5,
+    "Q": np.diag([0.01, 0.01, 0.0025, 0.0025]),
+    "dt": 15,
+    "meas": np.linspace(1.5, 1.2, 20),
+    "x0": np.array([0, 2e7, 4500, 0]),
+    "P0": np.diag([1e12, 9e12, 6.4e5, 6.4e5]),
+    "truth": np.ones((20, 4)) * 2e7,
+}
 
 
 def put(path, **changes):
@@ -142,7 +147,7 @@ class Evil:
     ],
 )
 def test_wrong_numbers_are_told_with_file_and_key(tmp_path, change, says):
-    with pytest.raises(ValueError, match="a.npz: ") as error:
+    with pytest.raises(ValueError, match=r"a\.npz: ") as error:
         pz.load(put(tmp_path / "a.npz", **change))
     assert says in str(error.value)
     assert len(str(error.value).splitlines()) == 1
@@ -180,16 +185,25 @@ def header(shape, descr="<f8"):
 @pytest.mark.parametrize(
     "content",
     [
-        header((10**12,)), header((-1,)), header((2**63,)), header("(" * 200 + ")" * 200), header((20,), "|O"), header((20,), "<f999"),
-        header((20,)) + b"\0" * 8, b"\x93NUMPY\x03\x00", b"\x93NUMPY", b"hello", header((True,)),
+        header((10**12,)),
+        header((-1,)),
+        header((2**63,)),
+        header("(" * 200 + ")" * 200),
+        header((20,), "|O"),
+        header((20,), "<f999"),
+        header((20,)) + b"\0" * 8,
+        b"\x93NUMPY\x03\x00",
+        b"\x93NUMPY",
+        b"hello",
+        header((True,)),
     ],
-)  # fmt: skip
+)
 def test_arrays_that_are_not_what_they_declare_are_refused(tmp_path, content):
     put(tmp_path / "whole.npz")
     with zipfile.ZipFile(tmp_path / "whole.npz") as whole, zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
         for info in whole.infolist():
             archive.writestr(info.filename, content if info.filename == "meas.npy" else whole.read(info))
-    with pytest.raises(ValueError, match="a.npz: key 'meas'"):
+    with pytest.raises(ValueError, match=r"a\.npz: key 'meas'"):
         pz.load(tmp_path / "a.npz")
 
 

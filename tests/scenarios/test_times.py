@@ -42,9 +42,18 @@ def test_minutes_become_seconds():
 
 @pytest.mark.parametrize(
     "table",
-    [{}, {"step": 1}, {"step": 1, "count": 2, "stop": 3}, {"step": 1e-300, "stop": 1}, {"list": [1, 1]}, {"list": 3},
-     {"list": [[0], [1]]}, {"step": 1e308, "count": 10}, {"start": 1e300, "step": 1, "count": 3}],
-)  # fmt: skip
+    [
+        {},
+        {"step": 1},
+        {"step": 1, "count": 2, "stop": 3},
+        {"step": 1e-300, "stop": 1},
+        {"list": [1, 1]},
+        {"list": 3},
+        {"list": [[0], [1]]},
+        {"step": 1e308, "count": 10},
+        {"start": 1e300, "step": 1, "count": 3},
+    ],
+)
 def test_what_makes_no_epochs_is_a_fault(table):
     faults = Faults()
     with np.errstate(all="ignore"):

@@ -52,14 +52,40 @@ parameters = {{ g = {g} }}
 """
 L, A, T = 1000.0, math.pi / 180, 60.0
 SI = {
-    "units": "m, rad, s", "g": 9.81, "k": 0.01, "k_sigma": 0.002, "r_ee": 1e-4, "r_eh": 1e-3, "r_hh": 25.0, "h": 1500.0, "x": 2e4,
-    "v": 300.0, "p_xx": 1e6, "p_vv": 100.0, "start": 120.0, "step": 30.0, "q_v": 0.5, "max_step": 6.0,
-}  # fmt: skip
+    "units": "m, rad, s",
+    "g": 9.81,
+    "k": 0.01,
+    "k_sigma": 0.002,
+    "r_ee": 1e-4,
+    "r_eh": 1e-3,
+    "r_hh": 25.0,
+    "h": 1500.0,
+    "x": 2e4,
+    "v": 300.0,
+    "p_xx": 1e6,
+    "p_vv": 100.0,
+    "start": 120.0,
+    "step": 30.0,
+    "q_v": 0.5,
+    "max_step": 6.0,
+}
 POWERS = {  # of length, angle and time in each number
-    "g": (1, 0, -2), "k": (0, 0, -1), "k_sigma": (0, 0, -1), "r_ee": (0, 2, 0), "r_eh": (1, 1, 0), "r_hh": (2, 0, 0), "h": (1, 0, 0),
-    "x": (1, 0, 0), "v": (1, 0, -1), "p_xx": (2, 0, 0), "p_vv": (2, 0, -2), "start": (0, 0, 1), "step": (0, 0, 1), "q_v": (1, 0, -1),
+    "g": (1, 0, -2),
+    "k": (0, 0, -1),
+    "k_sigma": (0, 0, -1),
+    "r_ee": (0, 2, 0),
+    "r_eh": (1, 1, 0),
+    "r_hh": (2, 0, 0),
+    "h": (1, 0, 0),
+    "x": (1, 0, 0),
+    "v": (1, 0, -1),
+    "p_xx": (2, 0, 0),
+    "p_vv": (2, 0, -2),
+    "start": (0, 0, 1),
+    "step": (0, 0, 1),
+    "q_v": (1, 0, -1),
     "max_step": (0, 0, 1),
-}  # fmt: skip
+}
 
 
 def read(numbers):
@@ -74,11 +100,18 @@ def test_every_number_is_converted_means_variances_and_times_alike():
     si, converted = read(SI), read({**other, "units": "km, deg, min"})
     p, q = si.problem, converted.problem
     for value, same in (
-        (q.mean, p.mean), (q.covariance, p.covariance), (q.given, p.given), (q.station_noise, p.station_noise),
-        (q.station_numbers, p.station_numbers), (q.process_noise.covariance, p.process_noise.covariance),
-        (q.prior_time, p.prior_time), (q.integrator.max_step, p.integrator.max_step), (converted.times, si.times),
-        (q.truth.state, p.truth.state), (q.truth.parameters["g"], p.truth.parameters["g"]),
-    ):  # fmt: skip
+        (q.mean, p.mean),
+        (q.covariance, p.covariance),
+        (q.given, p.given),
+        (q.station_noise, p.station_noise),
+        (q.station_numbers, p.station_numbers),
+        (q.process_noise.covariance, p.process_noise.covariance),
+        (q.prior_time, p.prior_time),
+        (q.integrator.max_step, p.integrator.max_step),
+        (converted.times, si.times),
+        (q.truth.state, p.truth.state),
+        (q.truth.parameters["g"], p.truth.parameters["g"]),
+    ):
         assert_allclose(value, same, rtol=1e-14, atol=0)
     assert q.model == p.model
 
@@ -86,9 +119,12 @@ def test_every_number_is_converted_means_variances_and_times_alike():
 def test_founding_problem_in_kilometres_and_degrees():
     text = show("satellite-bearing").replace('"m, deg"', '"km, deg"')
     for metres, kilometres in {
-        "3.986e14": "3.986e5", "[0.0, 2e7, 4500.0, 0.0]": "[0.0, 2e4, 4.5, 0.0]", "[1e6, 3e6, 800.0, 800.0]": "[1e3, 3e3, 0.8, 0.8]",
-        "[0.01, 0.01, 0.0025, 0.0025]": "[1e-8, 1e-8, 2.5e-9, 2.5e-9]", "6.371e6": "6371.0",
-    }.items():  # fmt: skip
+        "3.986e14": "3.986e5",
+        "[0.0, 2e7, 4500.0, 0.0]": "[0.0, 2e4, 4.5, 0.0]",
+        "[1e6, 3e6, 800.0, 800.0]": "[1e3, 3e3, 0.8, 0.8]",
+        "[0.01, 0.01, 0.0025, 0.0025]": "[1e-8, 1e-8, 2.5e-9, 2.5e-9]",
+        "6.371e6": "6371.0",
+    }.items():
         assert metres in text
         text = text.replace(metres, kilometres)
     faults = Faults()
@@ -131,10 +167,18 @@ def test_dimension_words_mean_the_units_of_the_header():
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("lenght", "did you mean 'length'"), ("", "is no unit"), ("m//s", "is no unit"), ("m s", "is no unit"), ("m**", "is no unit"),
-        ("2*m", "is no unit"), ("m**999", "is no unit"), ("au**99", "out of range"), ("__import__", "is no unit"), ("m" * 10**6, "is no unit"),
+        ("lenght", "did you mean 'length'"),
+        ("", "is no unit"),
+        ("m//s", "is no unit"),
+        ("m s", "is no unit"),
+        ("m**", "is no unit"),
+        ("2*m", "is no unit"),
+        ("m**999", "is no unit"),
+        ("au**99", "out of range"),
+        ("__import__", "is no unit"),
+        ("m" * 10**6, "is no unit"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_unit_is_refused(text, says):
     with pytest.raises(ValueError, match=r"unit") as error:
         Units().unit(text)

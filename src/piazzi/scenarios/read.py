@@ -20,9 +20,23 @@ from piazzi.scenarios.truth import read_truth
 from piazzi.scenarios.units import Units
 
 SECTIONS = (
-    "title", "units", "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise",
-    "integrator", "times", "truth", "picture",
-)  # fmt: skip
+    "title",
+    "units",
+    "states",
+    "memory",
+    "groups",
+    "dynamics",
+    "step",
+    "parameters",
+    "sensors",
+    "stations",
+    "prior",
+    "process_noise",
+    "integrator",
+    "times",
+    "truth",
+    "picture",
+)
 MAX_STEPS = 10**10
 MAX_ROWS = 2 * 10**7
 

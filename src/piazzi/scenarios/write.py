@@ -16,9 +16,19 @@ from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import Labels
 
 SECTIONS = (
-    "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise", "integrator",
+    "states",
+    "memory",
+    "groups",
+    "dynamics",
+    "step",
+    "parameters",
+    "sensors",
+    "stations",
+    "prior",
+    "process_noise",
+    "integrator",
     "truth",
-)  # fmt: skip
+)
 
 
 def problem_to_tables(problem: Problem) -> dict[str, Any]:
