@@ -18,7 +18,7 @@ STAGES = """
 expressions
 model
 kernels
-problem tracking
+problem tracking orbit
 scenarios
 simulation
 estimate

@@ -18,21 +18,50 @@ if TYPE_CHECKING:
         predict,
         update,
     )
+    from piazzi.estimate.substeps import choose_substeps, step_warning, substep_error
     from piazzi.evaluate import Comparison, compare
-    from piazzi.kernels import Discrete, Integrator, RungeKutta4, Taylor
+    from piazzi.kernels import (
+        Discrete,
+        DormandPrince,
+        DormandPrince5,
+        Euler,
+        Heun,
+        Integrator,
+        Kepler,
+        Midpoint,
+        Ralston,
+        RungeKutta,
+        RungeKutta4,
+        RungeKutta8,
+        Taylor,
+    )
     from piazzi.loading import load
     from piazzi.model import Model, Parameter, Sensor
-    from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Tracking, Truth
+    from piazzi.orbit import kepler_transition, propagate_kepler
+    from piazzi.problem import (
+        Gaussian,
+        Manoeuvre,
+        Problem,
+        ProcessNoise,
+        Station,
+        Tracking,
+        Truth,
+        with_gauss_markov,
+    )
     from piazzi.simulation import simulate
 
 # name -> module; nothing is imported before it is used
 _WHERE = {
     **dict.fromkeys(("Model", "Parameter", "Sensor"), "piazzi.model"),
-    **dict.fromkeys(("Discrete", "Integrator", "RungeKutta4", "Taylor"), "piazzi.kernels"),
-    **dict.fromkeys(("Gaussian", "Problem", "ProcessNoise", "Station", "Tracking", "Truth"), "piazzi.problem"),
+    **dict.fromkeys(("Discrete", "DormandPrince", "DormandPrince5", "Euler", "Heun", "Integrator", "Kepler"), "piazzi.kernels"),
+    **dict.fromkeys(("Midpoint", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Taylor"), "piazzi.kernels"),
+    **dict.fromkeys(("Gaussian", "Manoeuvre", "Problem", "ProcessNoise", "Station", "Tracking", "Truth"), "piazzi.problem"),
+    "with_gauss_markov": "piazzi.problem",
     **dict.fromkeys(("Estimate", "ExtendedKalmanFilter", "FactorGraph", "LiveFilter", "LiveWindow"), "piazzi.estimate"),
     **dict.fromkeys(("Prediction", "SlidingWindow", "Updated", "predict", "update"), "piazzi.estimate"),
     **dict.fromkeys(("Comparison", "compare"), "piazzi.evaluate"),
+    **dict.fromkeys(("choose_substeps", "step_warning", "substep_error"), "piazzi.estimate.substeps"),
+    **dict.fromkeys(("kepler_transition", "propagate_kepler"), "piazzi.orbit"),
     "simulate": "piazzi.simulation",
     "load": "piazzi.loading",
 }
@@ -41,19 +70,29 @@ __version__ = "0.1.0"
 __all__ = [
     "Comparison",
     "Discrete",
+    "DormandPrince",
+    "DormandPrince5",
     "Estimate",
+    "Euler",
     "ExtendedKalmanFilter",
     "FactorGraph",
     "Gaussian",
+    "Heun",
     "Integrator",
+    "Kepler",
     "LiveFilter",
     "LiveWindow",
+    "Manoeuvre",
+    "Midpoint",
     "Model",
     "Parameter",
     "Prediction",
     "Problem",
     "ProcessNoise",
+    "Ralston",
+    "RungeKutta",
     "RungeKutta4",
+    "RungeKutta8",
     "Sensor",
     "SlidingWindow",
     "Station",
@@ -61,11 +100,17 @@ __all__ = [
     "Tracking",
     "Truth",
     "Updated",
+    "choose_substeps",
     "compare",
+    "kepler_transition",
     "load",
     "predict",
+    "propagate_kepler",
     "simulate",
+    "step_warning",
+    "substep_error",
     "update",
+    "with_gauss_markov",
 ]
 
 

@@ -5,8 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.estimate.factor_graph import FactorGraph
-from piazzi.estimate.sliding_window import SlidingWindow
 from tests.laws.problems import MU_EARTH, b612, linear, satellite
 from tests.references import dense, quad
 
@@ -39,7 +37,7 @@ def rmse(estimate, tracking, first=0):
 def test_founding_recording(data_dir, start):
     """An independent C program and a quad-precision solve agree on these."""
     problem, tracking = recording(data_dir)
-    estimate = FactorGraph(start).estimate(problem, tracking)
+    estimate = pz.FactorGraph(start).estimate(problem, tracking)
     assert estimate.success, estimate.message
     assert estimate.view == "delayed"
     assert estimate.details["solver"] == "chain"
@@ -57,7 +55,7 @@ def test_exact_to_rounding(solver, start):
     values = tracking.values.copy()
     values[7] = np.nan
     tracking = pz.Tracking(tracking.row_times, values)
-    estimate = FactorGraph(start, tolerance=1e-12, solver=solver, cross_covariances=True).estimate(problem, tracking)
+    estimate = pz.FactorGraph(start, tolerance=1e-12, solver=solver, cross_covariances=True).estimate(problem, tracking)
     assert estimate.success, estimate.message
     exact = exact_solution(problem, tracking)
     sigma = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
@@ -90,7 +88,7 @@ def test_converges_on_every_one_of_200_recordings_of_the_toy_planet(Q):
     errors, filtered = [], []
     for seed in range(200):
         tracking = pz.simulate(problem, times, np.random.default_rng(seed))
-        estimate = FactorGraph().estimate(problem, tracking)
+        estimate = pz.FactorGraph().estimate(problem, tracking)
         assert estimate.success, f"seed {seed}: {estimate.message}"
         assert estimate.details["defect"] < 1e-9
         errors.append(rmse(estimate, tracking)[0])
@@ -110,13 +108,13 @@ def test_converges_on_recordings_of_the_founding_kind(start):
     assert len(trackings) >= 50
     iterations = []
     for tracking in trackings:
-        estimate = FactorGraph(start).estimate(problem, tracking)
+        estimate = pz.FactorGraph(start).estimate(problem, tracking)
         assert estimate.success, estimate.message
         # twice the cost is chi-square with as many degrees of freedom as there are measurements
         assert abs(2 * estimate.details["cost"] - 1441) < 6 * np.sqrt(2 * 1441)
         iterations.append(estimate.iterations)
     if start == "ekf":
-        assert np.median(iterations) <= 6
+        assert max(iterations) <= 6
 
 
 def test_filter_that_went_to_the_twin_does_not_lead_the_graph_there():
@@ -124,7 +122,7 @@ def test_filter_that_went_to_the_twin_does_not_lead_the_graph_there():
     problem, mirrored = wide_range(1e4), 0
     for seed in range(60):
         tracking = pz.simulate(problem, np.arange(100) * 0.1, np.random.default_rng(seed))
-        estimate, other = FactorGraph().estimate(problem, tracking), FactorGraph("prior").estimate(problem, tracking)
+        estimate, other = pz.FactorGraph().estimate(problem, tracking), pz.FactorGraph("prior").estimate(problem, tracking)
         assert estimate.success, estimate.message
         assert_allclose(estimate.mean, other.mean, rtol=0, atol=1e-4)
         assert_allclose(estimate.details["cost"], other.details["cost"], rtol=1e-6)
@@ -145,7 +143,7 @@ def test_wide_prior_meets_the_cramer_rao_bound(variance):
     times, errors = np.arange(100) * 0.1, []
     for seed in range(2000):
         tracking = pz.simulate(problem, times, np.random.default_rng(seed))
-        estimate = FactorGraph().estimate(problem, tracking)
+        estimate = pz.FactorGraph().estimate(problem, tracking)
         assert estimate.success, f"seed {seed}: {estimate.message}"
         errors.append(estimate.mean[0] - truth)
     bound = np.sqrt(np.diag(np.linalg.inv(range_information(truth, times, sigma))))
@@ -195,7 +193,7 @@ def test_diffuse_prior_is_solved_in_information_form(sigma, monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     problem, tracking, chain = two_clocks(sigma)
     exact = quad.smooth(*chain)
-    estimate = FactorGraph(cross_covariances=True).estimate(problem, tracking)
+    estimate = pz.FactorGraph(cross_covariances=True).estimate(problem, tracking)
     assert estimate.success, estimate.message
     assert estimate.details["solver"] == ("square-root information" if sigma >= 1e4 else "chain")
     unit = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
@@ -210,15 +208,28 @@ def test_chain_refuses_a_diffuse_prior(monkeypatch):
     """Where the information form is not allowed, or cannot be used, a wrong answer is not given instead."""
     monkeypatch.setenv("PIAZZI_JIT", "0")
     problem, tracking, _ = two_clocks(1e9)
-    estimate = FactorGraph(solver="chain").estimate(problem, tracking)
+    estimate = pz.FactorGraph(solver="chain").estimate(problem, tracking)
     assert not estimate.success
     assert "too wide" in estimate.message
     assert "solver='auto'" in estimate.message
     model = pz.Model(["a", "b"], ["0", "0"], [pz.Sensor("sum", ["a + b"])])
     half_known = pz.Problem(model, pz.Gaussian([0.0, 1.0], [1e18, 0.0]), None, [pz.Station("here", "sum", 1.0)])
-    estimate = FactorGraph().estimate(half_known, pz.Tracking(np.arange(3.0), [1.0, 2.0, 3.0]))
+    estimate = pz.FactorGraph().estimate(half_known, pz.Tracking(np.arange(3.0), [1.0, 2.0, 3.0]))
     assert not estimate.success
-    assert "zero prior variance" in estimate.message
+    assert "the prior is certain about some value" in estimate.message
+    with pytest.raises(ValueError, match=r"'information' cannot be used: .* certain about some value"):
+        pz.FactorGraph(solver="information").estimate(half_known, pz.Tracking([0.0], [1.0]))
+
+
+def test_information_form_says_where_a_step_has_no_inverse(monkeypatch):
+    """A step that forgets a state altogether, under a prior too wide for covariances."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x", "v"], ["x + dt*v", "0.0*v"], [pz.Sensor("place", ["x"])], discrete=True)
+    station, noise = pz.Station("here", "place", 0.01), pz.ProcessNoise([1e-2, 1e-2], "step")
+    problem = pz.Problem(model, pz.Gaussian([0.0, 0.0], [1e12, 1e12]), noise, [station])
+    estimate = pz.FactorGraph().estimate(problem, pz.Tracking(np.arange(6.0), np.arange(6.0)))
+    assert not estimate.success
+    assert "'x' is not finite from t = 1 s" in estimate.message
 
 
 def test_convergence_looks_at_measurements_too(monkeypatch):
@@ -226,7 +237,7 @@ def test_convergence_looks_at_measurements_too(monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     model = pz.Model(["a", "b"], ["0", "0"], [pz.Sensor("product", ["a*b"])])
     problem = pz.Problem(model, pz.Gaussian([300.0, 200.0], [1e8, 1e8]), None, [pz.Station("here", "product", 1e-6)])
-    estimate = FactorGraph("prior").estimate(problem, pz.Tracking(np.arange(3.0), [40000.0, 40000.0, 40000.0]))
+    estimate = pz.FactorGraph("prior").estimate(problem, pz.Tracking(np.arange(3.0), [40000.0, 40000.0, 40000.0]))
     assert estimate.success, estimate.message
     a, b = estimate.mean[0]
     assert abs(a * b - 40000.0) < 1e-6 * 1e-3
@@ -241,7 +252,7 @@ def test_cross_covariances_have_one_entry_per_interval(epochs, monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     problem = b612()
     tracking = pz.simulate(problem, np.arange(epochs) * 0.1, np.random.default_rng(0))
-    estimate = FactorGraph(cross_covariances=True).estimate(problem, tracking)
+    estimate = pz.FactorGraph(cross_covariances=True).estimate(problem, tracking)
     assert estimate.success, estimate.message
     cross = estimate.details["cross_covariances"]
     assert cross.shape == (epochs - 1, 4, 4)
@@ -264,7 +275,7 @@ def blowing_up():
 def test_dynamics_that_become_infinite_are_named(start, solver, monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     problem, tracking = blowing_up()
-    estimate = FactorGraph(start, solver=solver).estimate(problem, tracking)
+    estimate = pz.FactorGraph(start, solver=solver).estimate(problem, tracking)
     assert not estimate.success
     assert "'wild'" in estimate.message
     assert "t = " in estimate.message
@@ -277,10 +288,10 @@ def test_measurement_without_a_prediction_is_not_taken_for_a_missing_one(start, 
     model = pz.Model(["a"], ["0"], [pz.Sensor("logarithm", ["log(a)"])])
     problem = pz.Problem(model, pz.Gaussian([1.0], [100.0]), None, [pz.Station("here", "logarithm", 0.01)])
     tracking = pz.Tracking(np.arange(5.0), np.full(5, -3.0))
-    estimate = FactorGraph(start).estimate(problem, tracking)
+    estimate = pz.FactorGraph(start).estimate(problem, tracking)
     assert estimate.success, estimate.message
     assert_allclose(estimate.mean, np.exp(-3.0), rtol=1e-3)
-    for other in (pz.ExtendedKalmanFilter(), SlidingWindow(3)):
+    for other in (pz.ExtendedKalmanFilter(), pz.SlidingWindow(3)):
         lost = other.estimate(problem, tracking)
         assert not lost.success
         assert "t = 1 s" in lost.message
@@ -289,7 +300,7 @@ def test_measurement_without_a_prediction_is_not_taken_for_a_missing_one(start, 
 def test_iterations_that_do_not_suffice_are_a_failure_that_names_the_state_and_the_time():
     problem = b612()
     tracking = pz.simulate(problem, np.arange(100) * 0.1, np.random.default_rng(0))
-    estimate = FactorGraph(max_iterations=2).estimate(problem, tracking)
+    estimate = pz.FactorGraph(max_iterations=2).estimate(problem, tracking)
     assert not estimate.success
     assert "not converged after 2 iterations" in estimate.message
     assert any(f"{name!r} at t = " in estimate.message for name in problem.model.names)
@@ -302,8 +313,8 @@ def test_failed_start_is_followed_by_others():
     """Far away, where bearings cannot bring the orbit back; the window and the prior are tried in turn."""
     problem = satellite()
     tracking = pz.simulate(problem, np.arange(200) * 15.0, np.random.default_rng(3))
-    wanted = FactorGraph().estimate(problem, tracking)
-    lost = FactorGraph(np.tile([1.0, 1.0, 0.0, 0.0], (200, 1))).estimate(problem, tracking)
+    wanted = pz.FactorGraph().estimate(problem, tracking)
+    lost = pz.FactorGraph(np.tile([1.0, 1.0, 0.0, 0.0], (200, 1))).estimate(problem, tracking)
     assert lost.success, lost.message
     assert lost.details["start"].startswith("given")
     sigma = np.sqrt(np.diagonal(wanted.covariance, axis1=1, axis2=2))
@@ -315,7 +326,7 @@ def test_huge_prior_without_enough_measurements_keeps_its_width(monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     model = pz.Model(["seen", "unseen"], ["0", "0"], [pz.Sensor("first", ["seen"])])
     problem = pz.Problem(model, pz.Gaussian([0.0, 5.0], [1e30, 1e30]), None, [pz.Station("here", "first", 1.0)])
-    estimate = FactorGraph().estimate(problem, pz.Tracking(np.arange(4.0), [1.0, 2.0, 3.0, 2.0]))
+    estimate = pz.FactorGraph().estimate(problem, pz.Tracking(np.arange(4.0), [1.0, 2.0, 3.0, 2.0]))
     assert_allclose(estimate.mean, np.tile([2.0, 5.0], (4, 1)))
     assert_allclose(np.diagonal(estimate.covariance, axis1=1, axis2=2), np.tile([0.25, 1e30], (4, 1)))
 
@@ -335,13 +346,13 @@ def test_huge_prior_without_enough_measurements_keeps_its_width(monkeypatch):
 )
 def test_settings_are_checked(settings, told):
     with pytest.raises(ValueError, match=told):
-        FactorGraph(**settings)
+        pz.FactorGraph(**settings)
 
 
 def test_start_of_the_wrong_shape_is_refused():
     problem = b612()
     tracking = pz.simulate(problem, np.arange(5) * 0.1, np.random.default_rng(0))
     with pytest.raises(ValueError, match=r"start has shape \(4, 4\); it must be \(5, 4\)"):
-        FactorGraph(np.zeros((4, 4))).estimate(problem, tracking)
+        pz.FactorGraph(np.zeros((4, 4))).estimate(problem, tracking)
     with pytest.raises(ValueError, match="finite"):
-        FactorGraph(np.full((5, 4), np.nan)).estimate(problem, tracking)
+        pz.FactorGraph(np.full((5, 4), np.nan)).estimate(problem, tracking)

@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.estimate.factor_graph import FactorGraph
-from piazzi.estimate.sliding_window import SlidingWindow
 from tests.laws.graphs import LinearCase
 from tests.laws.problems import assert_same_estimate, linear, random_covariance, random_stable, sigma
 from tests.references import dense, smoother
@@ -38,7 +36,7 @@ def assert_graph_is(estimate, oracle, tolerance):
 @settings(max_examples=30)
 def test_graph_is_the_rauch_tung_striebel_smoother(n, widths, seed):
     case = LinearCase(n, widths, seed)
-    estimate = FactorGraph(cross_covariances=True).estimate(case.problem, case.tracking)
+    estimate = pz.FactorGraph(cross_covariances=True).estimate(case.problem, case.tracking)
     assert_graph_is(estimate, smoother.rauch_tung_striebel(*case.chain), 1e-7)
 
 
@@ -48,7 +46,7 @@ def test_graph_is_the_rauch_tung_striebel_smoother(n, widths, seed):
 def test_graph_is_dense_least_squares(solver, n, widths, rank, seed):
     """With full, singular and zero process noise, correlated.  The information form divides by the transition matrix."""
     case = LinearCase(n, widths, seed, rank=rank if rank < n else None, rotation=solver == "information")
-    estimate = FactorGraph(cross_covariances=True, solver=solver).estimate(case.problem, case.tracking)
+    estimate = pz.FactorGraph(cross_covariances=True, solver=solver).estimate(case.problem, case.tracking)
     assert_graph_is(estimate, dense.smooth(*case.chain), 1e-7)
     assert estimate.iterations <= 3
 
@@ -58,7 +56,7 @@ def test_graph_is_dense_least_squares(solver, n, widths, rank, seed):
 def test_a_state_known_at_the_start(n, widths, rank, seed):
     """Zero prior variance, with and without process noise."""
     case = LinearCase(n, widths, seed, rank=min(rank, n), sure=True)
-    estimate = FactorGraph(cross_covariances=True).estimate(case.problem, case.tracking)
+    estimate = pz.FactorGraph(cross_covariances=True).estimate(case.problem, case.tracking)
     oracle = dense.smooth(*case.chain)
     assert estimate.success, estimate.message
     assert_allclose(estimate.mean, oracle.mean, rtol=0, atol=1e-8)
@@ -73,7 +71,7 @@ def test_a_system_that_forgets_its_start(epochs):
     V = np.array([[c, -s], [s, c]])
     A, H, P, z = V @ np.diag([0.5, 0.95]) @ V.T, np.array([[1.0, -0.4]]), np.eye(2), np.sin(np.arange(epochs))[:, None]
     problem = linear(A, [H], [np.array([[0.01]])], np.zeros((2, 2)), pz.Gaussian(np.zeros(2), P))
-    estimate = FactorGraph(cross_covariances=True).estimate(problem, pz.Tracking(np.arange(float(epochs)), z))
+    estimate = pz.FactorGraph(cross_covariances=True).estimate(problem, pz.Tracking(np.arange(float(epochs)), z))
     seen = [dense.Seen(v, H, np.array([[0.01]])) for v in z]
     assert_graph_is(estimate, dense.smooth(np.zeros(2), P, [A] * (epochs - 1), [np.zeros((2, 2))] * (epochs - 1), seen), 1e-10)
 
@@ -83,7 +81,7 @@ def test_a_system_that_forgets_its_start(epochs):
 def test_window_is_the_filter_at_every_step(n, widths, rank, seed, lag):
     """In real time the length of the window makes no difference."""
     case = LinearCase(n, widths, seed, rank=rank if rank < n else None)
-    window = SlidingWindow(lag).estimate(case.problem, case.tracking)
+    window = pz.SlidingWindow(lag).estimate(case.problem, case.tracking)
     ekf = pz.ExtendedKalmanFilter().estimate(case.problem, case.tracking)
     assert window.success, window.message
     assert_same_estimate(window, ekf, 1e-7)
@@ -95,7 +93,7 @@ def test_window_is_the_filter_at_every_step(n, widths, rank, seed, lag):
 @settings(max_examples=30)
 def test_delayed_states_are_the_fixed_lag_smoother(n, widths, rank, seed, lag, iterations):
     case = LinearCase(n, widths, seed, rank=rank if rank < n else None)
-    estimator = SlidingWindow(lag, iterations)
+    estimator = pz.SlidingWindow(lag, iterations)
     delayed = estimator.estimate(case.problem, case.tracking).delayed
     mean, covariance = dense.fixed_lag(*case.chain, [max(k - lag + 1, 0) for k in range(case.epochs)])
     assert_same_estimate(delayed, SimpleNamespace(mean=mean, covariance=covariance), 1e-7)
@@ -109,7 +107,7 @@ def test_window_in_seconds_at_irregular_times(n, widths, seed, lag_seconds):
     rng = np.random.default_rng(seed)
     epoch = np.cumsum(rng.uniform(0.1, 3.0, case.epochs))
     tracking = pz.Tracking(epoch[case.row_epoch], case.values, case.tracking.row_stations)
-    estimate = SlidingWindow(lag_seconds=lag_seconds).estimate(case.problem, tracking)
+    estimate = pz.SlidingWindow(lag_seconds=lag_seconds).estimate(case.problem, tracking)
     first = [int(np.flatnonzero(epoch >= t - lag_seconds)[0]) for t in epoch]
     mean, covariance = dense.fixed_lag(*case.chain, first)
     assert_same_estimate(estimate.delayed, SimpleNamespace(mean=mean, covariance=covariance), 1e-7)
@@ -132,9 +130,9 @@ def test_few_epochs_and_a_prior_before_them(epochs, prior_time):
     oracle = dense.smooth(m, P, [s.Phi for s in steps], [s.Q for s in steps], seen)
     skip = len(nodes) - epochs
     wanted = dense.Trajectory(oracle.mean[skip:], oracle.joint[skip:, :, skip:])
-    estimate = FactorGraph(cross_covariances=True).estimate(problem, tracking)
+    estimate = pz.FactorGraph(cross_covariances=True).estimate(problem, tracking)
     assert_graph_is(estimate, wanted, 1e-9)
-    window = SlidingWindow(10).estimate(problem, tracking)
+    window = pz.SlidingWindow(10).estimate(problem, tracking)
     assert_same_estimate(window.delayed, wanted, 1e-9)
     assert_same_estimate(window, pz.ExtendedKalmanFilter().estimate(problem, tracking), 1e-9)
 
@@ -157,4 +155,4 @@ def test_noise_per_second_at_irregular_times(n, seed):
     dt = np.diff(times)
     seen = [dense.Seen(np.array([v]), np.eye(n)[:1], np.array([[0.5]])) for v in z]
     oracle = dense.smooth(m, P, [np.eye(n) + h * A for h in dt], [Q * h for h in dt], seen)
-    assert_graph_is(FactorGraph(cross_covariances=True).estimate(problem, pz.Tracking(times, z)), oracle, 1e-8)
+    assert_graph_is(pz.FactorGraph(cross_covariances=True).estimate(problem, pz.Tracking(times, z)), oracle, 1e-8)

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 import piazzi as pz
 from piazzi import kernels
+from piazzi.problem import Manoeuvre
 
 FLOATS = st.floats(-1e9, 1e9)
 POSITIVE = st.floats(1e-6, 1e6)
@@ -79,7 +80,15 @@ def problems(draw):
         draw(st.none() | st.floats(-1e6, 0.0)),
         draw(st.none() | truths(n, len(roles), discrete)),
         draw(st.just("") | TEXT),
+        [] if discrete else draw(st.lists(manoeuvres(states), max_size=2)),
     )
+
+
+@st.composite
+def manoeuvres(draw, states):
+    d = len(states)
+    jump = draw(st.lists(FLOATS, min_size=d, max_size=d))
+    return Manoeuvre(draw(st.floats(0.1, 1e6)), jump, covariances(draw, d, definite=False), states)
 
 
 @st.composite
@@ -90,6 +99,7 @@ def truths(draw, n, parameters, discrete):
         draw(st.none() | st.just(pz.ProcessNoise(np.zeros(n), "step")) | st.just(pz.ProcessNoise(np.eye(n)))),
         draw(st.none() | integrators(discrete)),
         draw(st.booleans()),
+        None if discrete else draw(st.none() | st.lists(manoeuvres(STATES[:n]), max_size=2)),
     )
 
 
@@ -133,6 +143,7 @@ def same_problem(p, q):
         and all(same_bits(getattr(p, a), getattr(q, a)) for a in arrays)
         and same_noise(p.process_noise, q.process_noise)
         and same_truth(p.truth, q.truth)
+        and same_manoeuvres(p.manoeuvres, q.manoeuvres)
     )
 
 
@@ -140,7 +151,7 @@ def same_noise(a, b):
     if a is None or b is None:
         return a is b
     full = [np.diag(n.covariance) if np.ndim(n.covariance) == 1 else n.covariance for n in (a, b)]
-    return same_bits(*full) and (a.per, a.method) == (b.per, b.method)
+    return same_bits(*full) and (a.per, a.method, a.axes) == (b.per, b.method, b.axes)
 
 
 def same_truth(a, b):
@@ -148,7 +159,22 @@ def same_truth(a, b):
         return a is b
     states = (a.state is None and b.state is None) or same_bits(a.state, b.state)
     plain = (dict(a.parameters), a.integrator, a.measurement_noise) == (dict(b.parameters), b.integrator, b.measurement_noise)
-    return states and plain and same_noise(a.process_noise, b.process_noise)
+    return (
+        states
+        and plain
+        and same_noise(a.process_noise, b.process_noise)
+        and (a.manoeuvres is None) == (b.manoeuvres is None)
+        and same_manoeuvres(a.manoeuvres or (), b.manoeuvres or ())
+    )
+
+
+def same_manoeuvres(a, b):
+    return len(a) == len(b) and all(
+        (m.time, tuple(m.states)) == (w.time, tuple(w.states))
+        and same_bits(m.delta_v, w.delta_v)
+        and same_bits(m.covariance, w.covariance)
+        for m, w in zip(a, b, strict=True)
+    )
 
 
 def same_tracking(a, b):

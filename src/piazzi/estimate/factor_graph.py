@@ -21,6 +21,9 @@ STARTS = ("ekf", "prior", "window")
 SOLVERS = ("auto", "chain", "information")
 # predicted over noise variance of one measurement beyond which a covariance keeps less than six digits of what is left
 DIFFUSE = 1e10
+# iterations that a second solution may take before the first is kept
+CHALLENGE = 20
+CERTAIN = "the information form does not apply, because the prior is certain about some value or combination of values"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +107,17 @@ class FactorGraph:
         covariances, in information form, and from the prior first: a filter cannot have worked.  Where the filter behind the
         start was wrong about its errors, from the prior too: it may have led to another solution of the same measurements.
         """
+        if self.solver == "information" and not InformationSolver.applies(chain.problem):
+            raise ValueError(f"solver 'information' cannot be used: {CERTAIN}")
         information, name = self.solver == "information", self.start if isinstance(self.start, str) else "given"
         solver: Solver = InformationSolver(chain) if information else CovarianceSolver(chain)
         waiting = [name, *(s for s in ("window", "prior") if s != name)]
         tried: list[tuple[str, Outcome]] = []
+        doubtful = False
         while waiting and not (tried and not tried[-1][1].failure):
             start = waiting.pop(0)
-            states, doubtful = self._begin(start, chain.problem, tracking, inputs)
+            states, wrong = self._begin(start, chain.problem, tracking, inputs)
+            doubtful = doubtful or wrong
             outcome = optimize(
                 chain,
                 solver,
@@ -126,7 +133,7 @@ class FactorGraph:
                 solver, information, tried = InformationSolver(chain), True, []
                 waiting = [*(["given"] if name == "given" else []), "prior", "window"]
         outcome, used = _together(tried), ", then ".join(start for start, _ in tried)
-        if doubtful and not outcome.failure:
+        if doubtful and not outcome.failure and tried[-1][0] != "prior":
             states, _ = self._begin("prior", chain.problem, tracking, inputs)
             outcome, better = self._challenge(chain, solver, outcome, with_first(chain, states))
             used = "prior" if better else used
@@ -135,14 +142,13 @@ class FactorGraph:
     def _challenge(self, chain: Chain, solver: Solver, outcome: Outcome, states: Array) -> tuple[Outcome, bool]:
         """The outcome, or that from other states where its cost is lower, and whether it is; the chain is left there."""
         x = chain.x.copy()
-        other = optimize(chain, solver, states, self.max_iterations, self.tolerance)
-        iterations = outcome.iterations + other.iterations
+        other = optimize(chain, solver, states, min(self.max_iterations, CHALLENGE), self.tolerance)
         if not other.failure and other.details["cost"] < outcome.details["cost"] - 1e-6:
-            return replace(other, iterations=iterations), True
+            return replace(other, iterations=outcome.iterations + other.iterations), True
         chain.x[:] = x
         chain.linearize()
         solver.solve(0.0)
-        return replace(outcome, iterations=iterations), False
+        return outcome, False
 
     def _begin(self, start: str, problem: Problem, tracking: Tracking, inputs: Inputs) -> tuple[Array, bool]:
         """States to start from, (K, n), and whether the filter that they come from was wrong about its errors."""
@@ -182,7 +188,7 @@ def _together(tried: list[tuple[str, Outcome]]) -> Outcome:
 
 def _too_wide(outcome: Outcome, solver: str) -> Outcome:
     """The outcome for a prior too wide for covariances where they must be used."""
-    way = "choose solver='auto'" if solver == "chain" else "a value with zero prior variance rules out the information form"
+    way = "choose solver='auto'" if solver == "chain" else CERTAIN
     return replace(outcome, failure=f"{TOO_WIDE} beside the noise of the measurements: {way}")
 
 

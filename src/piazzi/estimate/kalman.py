@@ -11,8 +11,10 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.guarded import Guard, GuardedLiveFilter, guarded_run
 from piazzi.estimate.inputs import Inputs, prepare, scratch
 from piazzi.estimate.live import LiveFilter
+from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
 
@@ -35,18 +37,36 @@ class ExtendedKalmanFilter:
     update : "auto", "joint" or "components"
         All components of a measurement at once, or one after the other (a full R is decorrelated first); the results are
         equal.  "auto" takes components where every R is diagonal.
+    iterations : int
+        Gauss-Newton steps per epoch, on the prediction and the measurements of the epoch together: from the second on, the
+        measurements are linearised at the estimate that they gave.  One is the filter that everybody means.
+    gate : float, optional
+        Probability that a good measurement passes, such as 0.999.  A row whose nu^T S^-1 nu at the prediction lies beyond that
+        quantile of chi-square is left out; ``details["rejected"]`` marks such rows, ``details["rejected_count"]`` counts them.
+        Default: every row is taken.
 
     Notes
     -----
     Jazwinski, Stochastic Processes and Filtering Theory (1970), ch. 8; covariance updates in Joseph form.  All measurements
-    of one epoch are linearised once, at the predicted state.
+    of one epoch are linearised once, at the predicted state (or, iterated, at the estimate so far).
     """
 
     update: Update = "auto"
+    iterations: int = 1
+    gate: float | None = None
 
     def __post_init__(self) -> None:
         if self.update not in get_args(Update):
             raise ValueError(f"update is {self.update!r}; it must be one of {', '.join(get_args(Update))}")
+        if self.iterations != int(self.iterations) or not 1 <= self.iterations <= 1000:
+            raise ValueError(f"iterations is {self.iterations}; it must be a whole number from 1 to 1000")
+        if self.gate is not None and not 0 < self.gate < 1:
+            raise ValueError(f"gate is {self.gate}; it must be a probability between 0 and 1, such as 0.999")
+
+    @property
+    def guard(self) -> Guard | None:
+        """What goes beyond the plain filter, None where nothing does."""
+        return None if self.iterations == 1 and self.gate is None else Guard(int(self.iterations), self.gate)
 
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Filtered means and covariances at every epoch.
@@ -57,12 +77,22 @@ class ExtendedKalmanFilter:
             Where the tracking does not fit the problem.
         """
         inputs = prepare(problem, tracking)
-        mean, P, nu, S, seconds = filter_run(problem, inputs, self.update)
-        return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs, seconds)
+        if self.guard is None:
+            mean, P, nu, S, seconds = filter_run(problem, inputs, self.update)
+            return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs, seconds)
+        watch = Stopwatch()
+        mean, P, nu, S, rejected = guarded_run(problem, inputs, update_fragments(problem, self.update), self.guard)
+        seconds = watch.seconds()
+        _check_start(problem, inputs, mean)
+        out = rejected.astype(bool)
+        out.setflags(write=False)
+        details = {} if self.gate is None else {"rejected": out, "rejected_count": int(out.sum())}
+        return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs * self.guard.iterations, seconds, details=details)
 
     def start(self, problem: Problem) -> LiveFilter:
         """A filter that takes one measurement at a time, beginning at the prior."""
-        return LiveFilter(problem, update_fragments(problem, self.update))
+        fragments = update_fragments(problem, self.update)
+        return LiveFilter(problem, fragments) if self.guard is None else GuardedLiveFilter(problem, fragments, self.guard)
 
 
 def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tuple[Array, Array, Array, Array, float]:
@@ -90,16 +120,17 @@ def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tup
         S,
     )
     seconds = time.perf_counter() - started
-    if not all(map(isfinite, mean[0].tolist())) and inputs.t_prior == inputs.t[0]:
-        raise ValueError(_singular_start(problem, inputs))
+    _check_start(problem, inputs, mean)
     return mean, P, nu, S, seconds
 
 
-def _singular_start(problem: Problem, inputs: Inputs) -> str:
-    """Why the very first update failed: the prior itself is finite."""
+def _check_start(problem: Problem, inputs: Inputs, mean: Array) -> None:
+    """Raise ValueError where the very first update failed: the prior itself is finite."""
+    if all(map(isfinite, mean[0].tolist())) or inputs.t_prior != inputs.t[0]:
+        return
     names = sorted({problem.stations[s].name for s in inputs.station[: inputs.first_row[1]]})
     at = ", ".join(f"{name} = {value:g}" for name, value in zip(problem.model.names, problem.mean, strict=True))
-    return f"station {', '.join(map(repr, names))} has no derivative at the prior mean ({at})"
+    raise ValueError(f"station {', '.join(map(repr, names))} has no derivative at the prior mean ({at})")
 
 
 @dataclass(frozen=True, eq=False)

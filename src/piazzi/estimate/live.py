@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from piazzi import kernels
 from piazzi.estimate.inputs import scratch
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.manoeuvres import check_after
 
 
 class Clock:
@@ -25,6 +26,8 @@ class Clock:
         """Seconds from the last epoch to `t`; raises ValueError where that is not a time after it."""
         if not np.isfinite(t):
             raise ValueError(f"time is {t}; it must be finite")
+        if self.time is None:
+            check_after(self.problem.manoeuvres, t)
         dt = 0.0 if self.time is None else t - self.time
         if dt < 0:
             raise ValueError(f"time {t:g} s is before {self.time:g} s, where the estimate stands")
@@ -80,7 +83,18 @@ class LiveFilter:
     innovation, innovation_covariance : (m,), (m, m), of the last update
     """
 
-    saved_names = ("base_mean", "base_covariance", "x_pred", "P_pred", "d", "P", "times", "mean", "covariance", "clock")
+    saved_names: ClassVar[tuple[str, ...]] = (
+        "base_mean",
+        "base_covariance",
+        "x_pred",
+        "P_pred",
+        "d",
+        "P",
+        "times",
+        "mean",
+        "covariance",
+        "clock",
+    )
 
     def __init__(self, problem: Problem, fragments: tuple[str, ...]) -> None:
         self.problem = problem

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from piazzi.estimate import Estimate
-from piazzi.evaluate.chi_square import quantile
+from piazzi.estimate.chi_square import quantile
 from piazzi.problem.checks import Array
 
 _CHUNK = 1 << 14  # epochs at a time: the work space stays in the processor's cache
@@ -83,6 +83,8 @@ def nees(estimate: Estimate) -> Consistency | None:
 def nis(estimate: Estimate) -> Consistency:
     """Normalised innovation squared, nu^T S^-1 nu, of every row of measurements, (J,), over the components that are there."""
     measured = ~np.isnan(estimate.tracking.padded(estimate.innovations.shape[1]))
+    if "rejected" in estimate.details:  # a gate's outliers say nothing about what the filter used
+        measured &= ~estimate.details["rejected"][:, None]
     return squared_in_sigmas(estimate.innovations, estimate.innovation_covariances, measured)
 
 

@@ -21,7 +21,9 @@ def fingerprint(problem: Problem, estimator: object) -> Array:
     """Digest of a problem and an estimator's settings as numbers: a checkpoint fits only what it was made with."""
     arrays = (problem.mean, problem.covariance, problem.process_noise.covariance, problem.given, problem.station_noise)
     numbers = b"".join(np.ascontiguousarray(a).tobytes() for a in (*arrays, problem.station_numbers))
-    words = repr((problem.model, problem.integrator, problem.prior_time, [s.name for s in problem.stations], estimator))
+    noise = problem.process_noise
+    kind = (noise.per, noise.method, noise.axes)
+    words = repr((problem.model, problem.integrator, problem.prior_time, [s.name for s in problem.stations], kind, estimator))
     digest = hashlib.sha256(numbers + words.encode()).digest()
     return np.frombuffer(digest, dtype=np.uint8).astype(float)
 

@@ -79,7 +79,7 @@ def document(group: Any, name: str) -> dict[str, Any]:
     Strings of variable length and attributes are not read at all: in a damaged file they make the HDF5 library hang.
     """
     data = _variable(group, name, True)
-    if data.dtype != np.dtype("S1") or data.ndim != 1:
+    if data.dtype != np.dtype("S1") or data.ndim not in (1, 2) or data.shape[1:] not in ((), (1,)):
         raise ValueError(f"variable {name!r} is not text")
     _check_size(data, name, 1)
     try:

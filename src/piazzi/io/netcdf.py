@@ -87,15 +87,19 @@ def _group(estimate: Estimate) -> xarray.Dataset:
 
 
 def _with_json(dataset: xarray.Dataset, **documents: Mapping[str, Any]) -> xarray.Dataset:
-    texts = {name: np.frombuffer(json.dumps(content).encode("ascii"), dtype="S1") for name, content in documents.items()}
-    return dataset.assign({name: (f"{name}_characters", text) for name, text in texts.items()})
+    """The dataset with a variable for each document."""
+    texts = {name: ((), np.array(json.dumps(content).encode("ascii"))) for name, content in documents.items()}
+    out = dataset.assign(texts)
+    for name in documents:
+        out[name].encoding = {"dtype": "S1", "char_dim_name": f"{name}_characters"}
+    return out
 
 
 def _write(path: str | os.PathLike[str], groups: Mapping[str, xarray.Dataset]) -> None:
     with atomic_path(path) as work:
         for group, dataset in groups.items():
             # no fill values: NaN already says what is missing, and integers have none missing
-            encoding = {name: {"_FillValue": None} for name in dataset.variables}
+            encoding = {name: {"_FillValue": None, **variable.encoding} for name, variable in dataset.variables.items()}
             mode: Any = "w" if group == "/" else "a"
             dataset.to_netcdf(work, mode=mode, group=group, engine="h5netcdf", encoding=encoding)
 
@@ -134,7 +138,9 @@ def _estimate(group: Any, problem: Problem, tracking: Tracking, delayed: Estimat
     about = Table(hdf5.document(group, "about"), "about", faults)
     view, failure = about.text("view", choices=get_args(View)), about.text("failure", "")
     iterations, seconds = about.number("iterations"), about.number("seconds")
-    details = dict(about.table("details").data)
+    details = about.raw("details")
+    if not isinstance(details, dict):
+        about.fault("details", "must be a table")
     _raise_first(faults)
     if view is None or iterations is None or seconds is None:
         raise ValueError("variable 'about' lacks the view, the iterations or the seconds of the estimate")

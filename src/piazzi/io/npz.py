@@ -133,7 +133,8 @@ def _misfit(problem: Problem, tracking: Tracking) -> str:
     faults = {
         f"its model is not that of {BASE}": problem.model != base.model or problem.parameters != base.parameters,
         "it has other than one station": len(problem.stations) != 1,
-        "its process noise is not Q dt per step": (noise.per, noise.method) != ("second", "scaled"),
+        "its process noise is not Q dt per step": (noise.per, noise.method, noise.axes) != ("second", "scaled", "states"),
+        "it has manoeuvres": bool(problem.manoeuvres),
         "its prior is not at the first epoch": problem.prior_time not in (None, 0.0),
         "its epochs are not k dt": dt is None,
         "it has more than one measurement at an epoch": len(tracking.row_times) != len(tracking.times),
@@ -145,5 +146,5 @@ def _misfit(problem: Problem, tracking: Tracking) -> str:
 
 def _is_plain(truth: Truth) -> bool:
     """Whether a truth half says nothing."""
-    nothing = (truth.state, truth.process_noise, truth.integrator)
+    nothing = (truth.state, truth.process_noise, truth.integrator, truth.manoeuvres)
     return all(part is None for part in nothing) and not truth.parameters and truth.measurement_noise

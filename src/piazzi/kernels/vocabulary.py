@@ -74,3 +74,6 @@ belief: Any
 transposed_lu: Any
 step_information: Any
 back_information: Any
+judge: Any
+surprise: Any
+update_epoch_guarded: Any

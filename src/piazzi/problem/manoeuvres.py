@@ -42,6 +42,12 @@ def _states(given: str | Sequence[str], model: Model, what: str) -> tuple[str, .
     return tuple(given)
 
 
+def check_after(manoeuvres: Sequence[Manoeuvre], start: float) -> None:
+    """Raise ValueError for a manoeuvre that is not after the prior, at `start`: nothing would apply it."""
+    if manoeuvres and manoeuvres[0].time <= start:
+        raise ValueError(f"the manoeuvre at {manoeuvres[0].time:g} s is not after the prior at {start:g} s")
+
+
 def packed(manoeuvres: Sequence[Manoeuvre], model: Model) -> Array:
     """Their number; then for each its time, the jump of the whole state (n) and its covariance (n, n)."""
     n = model.n

@@ -245,8 +245,7 @@ class Problem:
         start = float(times[0]) if self.prior_time is None else float(self.prior_time)
         if start > times[0]:
             raise ValueError(f"the prior is at {start:g} s, after the first measurement at {times[0]:g} s")
-        if self.manoeuvres and self.manoeuvres[0].time <= start:
-            raise ValueError(f"the manoeuvre at {self.manoeuvres[0].time:g} s is not after the prior at {start:g} s")
+        manoeuvres.check_after(self.manoeuvres, start)
         dt = np.empty_like(times)
         dt[0] = times[0] - start
         np.subtract(times[1:], times[:-1], out=dt[1:])

@@ -25,6 +25,7 @@ class Physics:
     states: list[str] = field(default_factory=list)
     memory: dict[str, str] = field(default_factory=dict)
     constants: list[str] = field(default_factory=list)
+    groups: dict[str, tuple[str, ...]] = field(default_factory=dict)
     units: dict[str, Unit] = field(default_factory=dict)
     components: dict[str, dict[str, Unit]] = field(default_factory=dict)
     numbers: dict[str, dict[str, Unit]] = field(default_factory=dict)
@@ -61,14 +62,14 @@ def read_physics(file: Table, units: Units) -> Physics:
     parameters = _parameters(file.table("parameters"), units, out)
     dynamics = _dynamics(file, out)
     sensors = [_sensor(name, table, units, out) for name, table in file.table("sensors").tables()]
-    groups = _groups(file, out)
+    out.groups = _groups(file, out)
     if len(file.faults) == before:
         labels = {s: out.units[s].label for s in out.states if out.units[s].label}
         with file.faults.at(""):
             equations = tuple(dynamics[s] for s in out.states)
             sound = tuple(s for s in sensors if s is not None)
             out.model = shared(
-                Model(tuple(out.states), equations, sound, tuple(parameters), groups, labels, "step" in file, out.memory)
+                Model(tuple(out.states), equations, sound, tuple(parameters), out.groups, labels, "step" in file, out.memory)
             )
     return out
 

@@ -75,11 +75,12 @@ def read_noise(table: Table, physics: Physics) -> ProcessNoise | None:
             names = everything
     per = table.text("per", "second", ("second", "step"))
     method = table.text("method", "integral", ("integral", "scaled"))
+    axes = table.text("axes", "states", ("states", "orbit"))
     Q = read_spread(table, names, physics.factors(names), missing=0.0)
     table.finish(SPREADS)
-    if Q is None or per is None or method is None:
+    if Q is None or per is None or method is None or axes is None:
         return None
-    return ProcessNoise(Q, per, method)  # type: ignore[arg-type]
+    return ProcessNoise(Q, per, method, axes)  # type: ignore[arg-type]
 
 
 def read_station(table: Table, physics: Physics) -> Station | None:

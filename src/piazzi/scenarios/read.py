@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Truth
+from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.scenarios.equations import read_physics
 from piazzi.scenarios.faults import Faults
 from piazzi.scenarios.integrators import read_integrator
+from piazzi.scenarios.manoeuvres import read_manoeuvres
 from piazzi.scenarios.quantities import read_noise, read_parameters, read_prior, read_stations
 from piazzi.scenarios.scenario import Picture, Scenario
 from piazzi.scenarios.table import Table
@@ -20,23 +21,9 @@ from piazzi.scenarios.truth import read_truth
 from piazzi.scenarios.units import Units
 
 SECTIONS = (
-    "title",
-    "units",
-    "states",
-    "memory",
-    "groups",
-    "dynamics",
-    "step",
-    "parameters",
-    "sensors",
-    "stations",
-    "prior",
-    "process_noise",
-    "integrator",
-    "times",
-    "truth",
-    "picture",
-)
+    "title", "units", "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior",
+    "process_noise", "integrator", "manoeuvres", "times", "truth", "picture",
+)  # fmt: skip
 MAX_STEPS = 10**10
 MAX_ROWS = 2 * 10**7
 
@@ -63,23 +50,21 @@ def read_problem(file: Table, name: str, units: Units) -> Problem | None:
     before = len(file.faults)
     physics = read_physics(file, units)
     parameters = read_parameters(file.table("parameters"), physics, physics.model)
-    stations: list[Station | None] = []
-    prior: Gaussian | None = None
-    noise: ProcessNoise | None = None
-    truth: Truth | None = None
-    prior_time = None
-    if physics.states:
-        stations = read_stations(file, physics)
-        prior, prior_time = read_prior(file.table("prior"), physics, file.table("truth"), units)
-        noise = read_noise(file.table("process_noise"), physics) if "process_noise" in file else None
-        truth = read_truth(file.table("truth"), physics, prior, units) if "truth" in file else None
+    integrator = read_integrator(file.table("integrator"), units)
     if "stations" not in file:
         file.fault("stations", "is missing: write [[stations]] with name, sensor and noise")
-    integrator = read_integrator(file.table("integrator"), units)
+    if not physics.states:
+        return None
+    stations = read_stations(file, physics)
+    prior, prior_time = read_prior(file.table("prior"), physics, file.table("truth"), units)
+    noise = read_noise(file.table("process_noise"), physics) if "process_noise" in file else None
+    manoeuvres = read_manoeuvres(file, physics, units)
+    truth = read_truth(file.table("truth"), physics, prior, units) if "truth" in file else None
     if len(file.faults) > before or physics.model is None or prior is None:
         return None
     with file.faults.at(""):
-        return Problem(physics.model, prior, noise, [s for s in stations if s], parameters, integrator, prior_time, truth, name)
+        places = [s for s in stations if s is not None]
+        return Problem(physics.model, prior, noise, places, parameters, integrator, prior_time, truth, name, manoeuvres)
     return None
 
 
@@ -96,6 +81,12 @@ def _check_size(problem: Problem, times: Array, faults: Faults) -> None:
     rows = len(times) * len(problem.stations)
     if rows > MAX_ROWS:
         faults.add("times", f"makes {rows:g} measurements; at most {MAX_ROWS:g} are allowed")
+    start = float(times[0]) if problem.prior_time is None else problem.prior_time
+    for m in problem.manoeuvres:
+        if m.time <= start:
+            faults.add("manoeuvres", f"the one at {m.time:g} s is not after the prior at {start:g} s")
+    if faults:
+        return
     with faults.at("prior.time" if problem.prior_time is not None else "integrator"):
         steps = problem.intervals(times)[1].sum(dtype=float)
         if steps > MAX_STEPS:

@@ -8,6 +8,7 @@ from piazzi.model import nearest
 from piazzi.problem import Gaussian, ProcessNoise, Truth
 from piazzi.scenarios.equations import Physics
 from piazzi.scenarios.integrators import read_integrator
+from piazzi.scenarios.manoeuvres import read_manoeuvres
 from piazzi.scenarios.quantities import read_noise
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import Units
@@ -31,8 +32,9 @@ def read_truth(table: Table, physics: Physics, prior: Gaussian | None, units: Un
         noise = read_noise(table.table("process_noise"), physics)
     integrator = read_integrator(table.table("integrator"), units)
     noisy = table.flag("measurement_noise", True)
+    manoeuvres = read_manoeuvres(table, physics, units) if "manoeuvres" in table else None
     table.finish()
-    return Truth(mean, parameters, noise, integrator, bool(noisy))
+    return Truth(mean, parameters, noise, integrator, bool(noisy), manoeuvres)
 
 
 def _true_parameters(table: Table, physics: Physics) -> dict[str, float]:

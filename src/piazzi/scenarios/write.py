@@ -11,24 +11,15 @@ from piazzi.model import Model, Parameter, Sensor
 from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Truth
 from piazzi.scenarios.faults import Faults, ScenarioError
 from piazzi.scenarios.integrators import write_integrator
+from piazzi.scenarios.manoeuvres import write_manoeuvre
 from piazzi.scenarios.read import read_problem
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import Labels
 
 SECTIONS = (
-    "states",
-    "memory",
-    "groups",
-    "dynamics",
-    "step",
-    "parameters",
-    "sensors",
-    "stations",
-    "prior",
-    "process_noise",
-    "integrator",
-    "truth",
-)
+    "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise",
+    "integrator", "manoeuvres", "truth",
+)  # fmt: skip
 
 
 def problem_to_tables(problem: Problem) -> dict[str, Any]:
@@ -47,6 +38,7 @@ def problem_to_tables(problem: Problem) -> dict[str, Any]:
         "prior": {"mean": _listed(problem.prior.mean), "covariance": _listed(problem.prior.covariance)},
         "process_noise": _noise(problem.process_noise),
         "integrator": write_integrator(problem.integrator),
+        "manoeuvres": [write_manoeuvre(m) for m in problem.manoeuvres],
     }
     if problem.prior_time is not None:
         tables["prior"]["time"] = float(problem.prior_time)
@@ -100,7 +92,7 @@ def _station(station: Station) -> dict[str, Any]:
 
 def _noise(noise: ProcessNoise) -> dict[str, Any]:
     key = "covariance" if np.ndim(noise.covariance) == 2 else "variance"
-    return {key: _listed(noise.covariance), "per": noise.per, "method": noise.method}
+    return {key: _listed(noise.covariance), "per": noise.per, "method": noise.method, "axes": noise.axes}
 
 
 def _truth(truth: Truth) -> dict[str, Any]:
@@ -114,6 +106,8 @@ def _truth(truth: Truth) -> dict[str, Any]:
         out["process_noise"] = _noise(truth.process_noise)
     if truth.integrator is not None:
         out["integrator"] = write_integrator(truth.integrator)
+    if truth.manoeuvres is not None:
+        out["manoeuvres"] = [write_manoeuvre(m) for m in truth.manoeuvres]
     return out
 
 

@@ -16,7 +16,7 @@ def resized(h, error, widest):
 
 @inline
 def coast(t, dt, count, x, p):
-    """The state `dt` seconds later; NaN where `MAX_STEPS` do not get there."""
+    """The state `dt` seconds later; NaN where `MAX_STEPS` do not get there or steps vanish."""
     widest = dt / count
     h = widest
     at = 0.0
@@ -30,6 +30,8 @@ def coast(t, dt, count, x, p):
             if last:
                 return x
         h = resized(h, error, widest)
+        if fabs(h) <= 1e-15 * fabs(dt):
+            break
     return nan * x
 
 
@@ -50,4 +52,6 @@ def coast_jacobian(t, dt, count, x, R, p):
             if last:
                 return x, R
         h = resized(h, error, widest)
+        if fabs(h) <= 1e-15 * fabs(dt):
+            break
     return nan * x, nan * R

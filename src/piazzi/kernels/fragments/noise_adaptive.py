@@ -41,4 +41,6 @@ def coast_noise(t, dt, count, x, R, p, Q, scale):
             if last:
                 return x, Phi, symmetric(Q_step)
         h = resized(h, error, widest)
+        if fabs(h) <= 1e-15 * fabs(dt):
+            break
     return nan * x, nan * Phi, nan * Q_step

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piazzi.evaluate.chi_square import cdf, quantile
+from piazzi.estimate.chi_square import cdf, quantile
 
 probability = st.floats(1e-6, 1 - 1e-9)
 

@@ -1,0 +1,141 @@
+"""The extended Kalman filter with iterated updates and an innovation gate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.estimate.chi_square import quantile
+from piazzi.estimate.inputs import Inputs, scratch
+from piazzi.estimate.live import LiveFilter, checked_measurement
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+
+
+@dataclass(frozen=True)
+class Guard:
+    """How an epoch is taken in: so many Gauss-Newton steps, and the share of good measurements that the gate lets through."""
+
+    iterations: int
+    gate: float | None
+
+    def thresholds(self, width: int) -> Array:
+        """Largest nu^T S^-1 nu of a row with 0, 1, ..., `width` components, (width + 1,)."""
+        if self.gate is None:
+            return np.full(width + 1, np.inf)
+        return np.array([np.inf, *(quantile(self.gate, m) for m in range(1, width + 1))])
+
+
+def guarded_run(problem: Problem, inputs: Inputs, fragments: tuple[str, ...], guard: Guard) -> tuple[Array, ...]:
+    """Means (K, n), covariances (K, n, n), innovations (J, m) with theirs (J, m, m), and 1 for each row rejected, (J,)."""
+    parts = ("transition", problem.noise_fragment, *fragments, "epoch_guarded", "filter_guarded")
+    library = kernels.load(problem.spec(*parts))
+    K, n, (J, m) = inputs.epochs, problem.model.n, inputs.z.shape
+    mean, P = np.empty((K, n)), np.empty((K, n, n))
+    nu, S = np.empty((J, m)), np.empty((J, m, m))
+    rejected = np.zeros(J, dtype=np.int64)
+    library.run_guarded_filter(
+        K,
+        inputs.t,
+        inputs.t_prior,
+        inputs.count,
+        inputs.scale,
+        *inputs.measured(problem),
+        problem.given,
+        problem.process_noise.covariance,
+        problem.mean,
+        problem.covariance,
+        *scratch(problem),
+        guard.iterations,
+        guard.thresholds(m),
+        rejected,
+        mean,
+        P,
+        nu,
+        S,
+    )
+    return mean, P, nu, S, rejected
+
+
+class GuardedLiveFilter(LiveFilter):
+    """A filter in progress with iterated updates and a gate: the measurements of an epoch so far are taken together.
+
+    Attributes
+    ----------
+    rejected : bool
+        Whether the gate rejected the last measurement.
+    """
+
+    saved_names: ClassVar[tuple[str, ...]] = (*LiveFilter.saved_names, "epoch_values", "epoch_stations")
+
+    def __init__(self, problem: Problem, fragments: tuple[str, ...], guard: Guard) -> None:
+        super().__init__(problem, fragments)
+        m = problem.model.width
+        parts = ("transition", problem.noise_fragment, *fragments, "epoch_guarded", "filter_live_guarded")
+        self._library = kernels.load(problem.spec(*parts))
+        self._guard, self._thresholds, self._space = guard, guard.thresholds(m), scratch(problem)
+        self._values, self._rows_of = np.empty((0, m)), np.empty(0, dtype=np.int64)
+        self.rejected = False
+
+    def predict(self, t: float) -> None:
+        stood = self._predicted_to
+        super().predict(t)
+        if t != stood:
+            self._values, self._rows_of = self._values[:0], self._rows_of[:0]
+
+    def update(self, station: str, z: Any, t: float | None = None) -> None:
+        s = checked_measurement(self.problem, self._stations, station, z, self._row)
+        if t is not None:
+            self.predict(t)
+        elif self._predicted_to is None:
+            raise ValueError(
+                "the time of the first measurement is not known: call predict(t) first, or give the problem a prior_time"
+            )
+        self._values = np.vstack([self._values, self._row])
+        self._rows_of = np.append(self._rows_of, np.int64(s))
+        rows, m = self._values.shape
+        rejected, nu, S = np.zeros(rows, dtype=np.int64), np.empty((rows, m)), np.empty((rows, m, m))
+        p = self.problem
+        self._library.live_update_guarded(
+            rows,
+            self._times,
+            self._values,
+            self._rows_of,
+            p.station_sensor,
+            p.station_numbers,
+            p.station_noise,
+            p.station_correlated,
+            p.given,
+            *self._space,
+            self._guard.iterations,
+            self._thresholds,
+            rejected,
+            self._x_pred,
+            self._P_pred,
+            self.mean,
+            self.covariance,
+            nu,
+            S,
+        )
+        self.innovation[:], self.innovation_covariance[:] = nu[-1], S[-1]
+        self.rejected, self._measured = bool(rejected[-1]), True
+
+    def checkpoint(self) -> dict[str, Array]:
+        return super().checkpoint() | {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
+
+    def restore(self, saved: Mapping[str, Array]) -> None:
+        super().restore(saved)
+        values, stations = (np.asarray(saved.get(name, ())) for name in ("epoch_values", "epoch_stations"))
+        m, known = self.problem.model.width, len(self.problem.stations)
+        if (
+            values.ndim != 2
+            or values.shape[1] != m
+            or stations.shape != (len(values),)
+            or not np.isin(stations, range(known)).all()
+        ):
+            raise ValueError("the checkpoint's measurements of its epoch do not fit this problem")
+        self._values, self._rows_of = np.array(values, dtype=float), np.array(stations, dtype=np.int64)

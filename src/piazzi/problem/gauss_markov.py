@@ -1,0 +1,94 @@
+"""A problem whose accelerations wander: its model with Gauss-Markov states, and the numbers of these."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from piazzi import model as equations
+from piazzi.model.gauss_markov import driven_states
+from piazzi.problem.checks import Array, numeric
+from piazzi.problem.parts import Gaussian, ProcessNoise, Truth
+from piazzi.problem.problem import Problem
+
+
+def with_gauss_markov(
+    problem: Problem,
+    sigma: Any,
+    time_constant: float,
+    states: str | Sequence[str] = "velocity",
+    parameter: str = "tau",
+    prefix: str = "gm_",
+) -> Problem:
+    """The problem with a stationary first-order Gauss-Markov process added to the rate of each of `states`.
+
+    Parameters
+    ----------
+    problem : Problem
+        With a continuous model, and process noise per second (or none).
+    sigma : float or (d,)
+        Standard deviation of each process: m/s^2 for velocities in m/s.  Its prior is zero with that deviation, its process
+        noise density 2 sigma^2 / tau.
+    time_constant : float
+        Seconds after which a disturbance has decayed to 1/e.
+    states : name of a group, or names of states
+    parameter : str
+        Name that the time constant gets in the model.
+    prefix : str
+        Of the new states' names.
+
+    Returns
+    -------
+    Problem
+        Where the problem says what is true otherwise, the truth has no such disturbances: a given first state is continued by
+        zeros, and so is the truth's own process noise.
+
+    Raises
+    ------
+    ValueError
+        For process noise per step, or values that are not positive.
+    """
+    model = equations.with_gauss_markov(problem.model, states, parameter, prefix)
+    driven = driven_states(problem.model, states)
+    spread = np.broadcast_to(numeric(sigma, "sigma"), (len(driven),))
+    if not (np.isfinite(spread) & (spread > 0)).all() or not 0 < time_constant < np.inf:
+        raise ValueError(f"sigma is {sigma} and time_constant {time_constant}; both must be positive")
+    if problem.process_noise.per != "second" and problem.process_noise.covariance.any():
+        raise ValueError("process noise is per step, a Gauss-Markov process needs it per second: give a density")
+    noise = problem.process_noise if problem.process_noise.covariance.any() else ProcessNoise(problem.process_noise.covariance)
+    nd = len(problem.model.states)
+    prior = np.zeros((nd + len(driven), nd + len(driven)))
+    prior[:nd, :nd] = problem.prior.covariance
+    prior[nd:, nd:] = np.diag(spread**2)
+    density = _continued(problem, noise.covariance, model, 2 * spread**2 / time_constant)
+    return replace(
+        problem,
+        model=model,
+        prior=Gaussian([*problem.prior.mean, *np.zeros(len(driven))], prior),
+        process_noise=replace(noise, covariance=density),
+        parameters={**problem.parameters, parameter: float(time_constant)},
+        truth=None if problem.truth is None else _calm(problem, problem.truth, model, len(driven)),
+    )
+
+
+def _continued(problem: Problem, covariance: Array, model: equations.Model, variances: Array) -> Array:
+    """A covariance of the old values with these variances of the new ones, by name, (n, n)."""
+    out = np.zeros((model.n, model.n))
+    old = [model.names.index(name) for name in problem.model.names]
+    out[np.ix_(old, old)] = covariance
+    new = [i for i in range(len(model.states)) if i not in old]
+    out[new, new] = variances
+    return out
+
+
+def _calm(problem: Problem, truth: Truth, model: equations.Model, count: int) -> Truth:
+    """The truth, undisturbed by the new states."""
+    state = None if truth.state is None else [*numeric(truth.state, "true state").reshape(-1), *np.zeros(count)]
+    noise = truth.process_noise
+    if noise is not None:
+        given = replace(problem, process_noise=noise, truth=None).process_noise
+        noise = replace(given, covariance=_continued(problem, given.covariance, model, np.zeros(count)))
+    return replace(truth, state=state, process_noise=noise)
