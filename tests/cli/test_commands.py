@@ -38,6 +38,18 @@ def test_a_recording_is_simulated_anew_at_its_times(call, tmp_path):
     assert len({t.values.tobytes() for t in (first, second, third)}) == 3
 
 
+def test_substeps_are_chosen_by_a_tolerance(call, tmp_path):
+    """As few as that asks for; the problem is kept with them."""
+    counts = []
+    for tolerance in (1.0, 1e-6):
+        result = call("simulate", SCENARIO, "--tolerance", tolerance, "-o", tmp_path / "t.nc", "--json")
+        assert result.status == 0
+        counts.append(pz.load(tmp_path / "t.nc")[0].integrator.substeps)
+        assert f"substeps={counts[-1]}" in result.document["integrator"]
+    assert 1 <= counts[0] < counts[1] < 100
+    assert "tolerance is -1" in call("simulate", SCENARIO, "--tolerance", -1).refused()
+
+
 def test_a_problem_that_a_format_cannot_hold_leaves_no_file(call, tmp_path):
     call("simulate", SCENARIO, "-o", tmp_path / "t.npz").refused()
     assert not list(tmp_path.iterdir())

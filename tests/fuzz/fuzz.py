@@ -1,7 +1,7 @@
 """Feeds damaged and invented files to the readers: `python tests/fuzz/fuzz.py scenario|csv|npz|nc [--minutes 10] [--seed 0]`.
 
 Mutates good files byte by byte, token by token and line by line; inside archives the members too, with their checksums made
-good again.  Inputs that draw a message of a new shape join the files to mutate, which leads the search deeper.  A reader may
+good again.  Inputs that are refused by a line that had refused none join the files to mutate, which leads the search deeper.  A reader may
 return or raise ValueError or OSError with one printable line, within seconds and a bounded memory; whatever else happens is
 kept under --keep, with the input.  NetCDF files are read in a child process each.  Not part of the test suite.
 """
@@ -281,8 +281,19 @@ def attempt(target: str, path: Path, problem: pz.Problem | None) -> str:
             raise AssertionError(f"message that is no line: {text!r}") from error
         if not isinstance(error, ValueError | OSError) or type(error) is UnicodeDecodeError:
             raise
-        return re.sub(r"'[^']*'|\d+", "", text.replace(str(path), ""))[:120]
+        return where(error)
     return "good"
+
+
+def where(error: BaseException) -> str:
+    """The line that first raised, and the start of what it said."""
+    said = re.sub(r"'[^']*'|\d+", "", str(getattr(error, "faults", [error])[0]))
+    first: BaseException = error
+    while first.__context__ is not None:
+        first = first.__context__
+    last = traceback.extract_tb(first.__traceback__)[-1]
+    place = f"{Path(last.filename).name}:{last.lineno}"
+    return f"{place} {said.split(': ')[-1][:40]}" if place.startswith(("faults", "loader", "checks")) else place
 
 
 def attempt_in_child(target: str, path: Path, problem: pz.Problem | None) -> str:
@@ -314,13 +325,14 @@ def run(target: str, minutes: float, seed: int, keep: Path) -> int:
     warnings.simplefilter("error")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        corpus = seeds(target, folder)
+        good = seeds(target, folder)
+        corpus = list(good)
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         problem = load_scenario(folder / "csv.toml").problem if target == "csv" else None
         path = folder / f"input.{'toml' if target == 'scenario' else target}"
         slowest, count, end = 0.0, 0, time.monotonic() + 60 * minutes
         while time.monotonic() < end:
-            data = mutate(rng.choice(corpus), rng, target, corpus)
+            data = mutate(rng.choice(corpus if rng.random() < 0.5 else good), rng, target, corpus)
             path.write_bytes(data)
             (keep / f"last-{target}").write_bytes(data)  # what is left behind by a crash
             if target == "csv":

@@ -66,7 +66,8 @@ def test_directions_of_an_information_matrix(n, rank, seed):
     with sizes(n):
         marginals.directions(A, rows)
     rows = rows.reshape(n, n)
-    assert_allclose(rows.T @ rows, A, rtol=0, atol=1e-12 * max(np.abs(A).max(), 1e-300))
+    # without pivoting, a singular matrix loses digits where its first rows are almost dependent
+    assert_allclose(rows.T @ rows, A, rtol=0, atol=(1e-13 if rank == n else 1e-9) * max(np.abs(A).max(), 1e-300))
 
 
 @given(m=st.integers(1, 3), seed=SEEDS, missing=st.integers(0, 7))

@@ -22,7 +22,15 @@ ENDINGS = (".nc", ".csv", ".npz")
 @options.as_json
 @options.seed
 @options.scenario
-def command(source: str, output_file: str | None, as_json: bool, seed: int, scenario: str | None) -> int:
+@click.option(
+    "--tolerance",
+    type=float,
+    metavar="SIGMA",
+    help="Choose the substeps: their error moves no estimate by more standard deviations.",
+)
+def command(
+    source: str, output_file: str | None, as_json: bool, seed: int, scenario: str | None, tolerance: float | None
+) -> int:
     """Draw a true path and measurements of it.
 
     A scenario says what is true and when it is measured.  A recording is simulated anew: its problem, at its times.
@@ -31,6 +39,7 @@ def command(source: str, output_file: str | None, as_json: bool, seed: int, scen
       piazzi simulate b612-range --seed 3 -o tracking.nc
       piazzi simulate my-scenario.toml -o rows.csv
       piazzi simulate b612-range -o - | piazzi estimate - --scenario b612-range
+      piazzi simulate satellite-bearing --tolerance 0.01 -o fine.nc
     """
     output.check_output(output_file, ENDINGS)
     if as_json and output_file == output.STDOUT:
@@ -39,7 +48,11 @@ def command(source: str, output_file: str | None, as_json: bool, seed: int, scen
 
     found = load_source(source, seed, scenario)
     problem, tracking = found.problem, found.tracking
-    if found.recorded:
+    if tolerance is not None:
+        from piazzi.estimate.substeps import choose_substeps
+
+        problem = choose_substeps(problem, tracking.times, tolerance)
+    if found.recorded or tolerance is not None:
         import numpy as np
 
         from piazzi.simulation import simulate
@@ -56,6 +69,8 @@ def command(source: str, output_file: str | None, as_json: bool, seed: int, scen
 
 def to_dict(problem: Problem, tracking: Tracking, name: str, seed: int, output_file: str | None) -> dict[str, Any]:
     """What was simulated, in numbers; the tracking itself is in the file."""
+    from piazzi.simulation import true_problem
+
     assert tracking.truth is not None
     return {
         "schema": SCHEMA,
@@ -63,6 +78,7 @@ def to_dict(problem: Problem, tracking: Tracking, name: str, seed: int, output_f
         "seed": seed,
         "epochs": len(tracking.times),
         "measurements": len(tracking.row_times),
+        "integrator": str(true_problem(problem).integrator),
         "states": list(problem.model.names),
         "units": {n: problem.model.unit(n) for n in problem.model.names},
         "first": {"time": float(tracking.times[0]), "truth": tracking.truth[0].tolist()},
@@ -88,6 +104,8 @@ def write(path: str, problem: Problem, tracking: Tracking) -> None:
 
 def _print(problem: Problem, tracking: Tracking, name: str, seed: int, output_file: str | None) -> None:
     from piazzi.present.tables import heading, truth_table
+    from piazzi.simulation import true_problem
 
+    steps = f"Steps: {true_problem(problem).integrator}"
     after = f"Wrote {output_file}" if output_file else "Nothing was written: -o tracking.nc keeps it."
-    output.print_rich(heading(problem, tracking, name, f", seed {seed}"), "", truth_table(problem, tracking), "", after)
+    output.print_rich(heading(problem, tracking, name, f", seed {seed}"), "", truth_table(problem, tracking), "", steps, after)

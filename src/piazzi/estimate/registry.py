@@ -11,6 +11,8 @@ from typing import Any, cast
 from piazzi.estimate.estimator import Estimator, View
 from piazzi.model import nearest
 
+GATE, ITERATIONS = 0.999, 5  # where the text gives no number
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -28,8 +30,27 @@ class Entry:
         return cast(Estimator, getattr(import_module(module), name)(**self.settings(option)))
 
 
-def _update(option: str) -> Mapping[str, Any]:
-    return {"update": option} if option else {}
+def _filter(option: str) -> Mapping[str, Any]:
+    """How rows are taken in, and a gate: "gate" or "gate=0.99", in any order, with colons between them."""
+    words = [word.partition("=") for word in option.split(":")] if option else []
+    settings: dict[str, Any] = {}
+    for word, equals, value in words:
+        if word != "gate":
+            settings["update"] = word + equals + value
+            continue
+        try:
+            settings["gate"] = float(value) if equals else GATE
+        except ValueError:
+            raise ValueError(f"gate is {value!r}; it must be a probability, such as gate={GATE}") from None
+    return settings
+
+
+def _iterated(option: str) -> Mapping[str, Any]:
+    """How often, then the options of a filter: ``iekf:3:gate``."""
+    first, _, rest = option.partition(":")
+    if re.fullmatch(r"\d{1,9}", first, re.ASCII):
+        return {"iterations": int(first), **_filter(rest)}
+    return {"iterations": ITERATIONS, **_filter(option)}
 
 
 def _start(option: str) -> Mapping[str, Any]:
@@ -45,11 +66,18 @@ def _window(option: str) -> Mapping[str, Any]:
 
 ESTIMATORS: Mapping[str, Entry] = {
     "ekf": Entry(
-        "ekf[:joint|:components]",
-        "extended Kalman filter",
+        "ekf[:joint|:components][:gate[=P]]",
+        "extended Kalman filter; gate=P leaves out rows that are worse than a share P of good ones",
         "piazzi.estimate.kalman:ExtendedKalmanFilter",
         ("realtime",),
-        _update,
+        _filter,
+    ),
+    "iekf": Entry(
+        "iekf[:ITERATIONS][:gate[=P]]",
+        "extended Kalman filter whose updates are iterated",
+        "piazzi.estimate.kalman:ExtendedKalmanFilter",
+        ("realtime",),
+        _iterated,
     ),
     "graph": Entry(
         "graph[:ekf|:prior|:window]",

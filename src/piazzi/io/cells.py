@@ -108,7 +108,7 @@ def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -
         return None
     import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 
-    kinds = {i: "category" if name == STATION else float for i, name in enumerate(header)}
+    kinds = {i: str if name == STATION else float for i, name in enumerate(header)}
     try:
         table = pd.read_csv(
             io.BytesIO(body), header=None, index_col=False, dtype=kinds, na_values=[""], keep_default_na=False,
@@ -120,8 +120,8 @@ def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -
     station: Array | None = None
     names: tuple[str, ...] = ()
     if STATION in header:
-        column = table[header.index(STATION)].cat
-        station, names = _merged(np.asarray(column.codes, dtype=np.int64), [str(name).strip() for name in column.categories])
+        codes, given = pd.factorize(table[header.index(STATION)])
+        station, names = _merged(np.asarray(codes, dtype=np.int64), [str(name).strip() for name in given])
         if "" in names or (station < 0).any():
             return None
     return Cells(comments, numbers, station, names, range(line, line + len(table)))

@@ -127,7 +127,7 @@ class DormandPrince(Integrator):
 
     substeps: int | None = field(default=None, kw_only=True)
     max_step: float | None = field(default=None, kw_only=True)
-    rtol: float = 1e-11
+    rtol: float = 1e-12
     atol: float = 1e-12
     max_steps: int = 100_000
 

@@ -52,13 +52,15 @@ def covariance(value: Any, n: int, what: str, names: Sequence[str], *, definite:
     if bad.size:
         i, j = bad[0]
         raise ValueError(f"{what} has {out[i, j]} at ({names[i]}, {names[j]}); it must be finite")
-    _check_symmetric(out, what, names)
-    _check_definite(out, what, names, definite)
-    return frozen(0.5 * (out + out.T))
+    with np.errstate(over="ignore"):  # of numbers near the largest double
+        _check_symmetric(out, what, names)
+        _check_definite(out, what, names, definite)
+    return frozen(0.5 * out + 0.5 * out.T)
 
 
 def _check_symmetric(a: Array, what: str, names: Sequence[str]) -> None:
-    scale = np.sqrt(np.outer(np.abs(np.diag(a)), np.abs(np.diag(a)))) + np.abs(a) + np.abs(a.T)
+    sigma = np.sqrt(np.abs(np.diag(a)))
+    scale = np.outer(sigma, sigma) + np.abs(a) + np.abs(a.T)
     off = np.abs(a - a.T) > 1e-9 * scale
     if off.any():
         i, j = np.argwhere(off)[0]
