@@ -2,7 +2,8 @@
 
 Mutates good files byte by byte, token by token and line by line; inside archives the members too, with their checksums made
 good again.  Inputs that are refused by a line that had refused none join the files to mutate, which leads the search deeper.
-A reader may return or raise ValueError or OSError with one printable line, within seconds and a bounded memory; whatever else happens is
+A reader may return or raise ValueError or OSError with one printable line, within seconds and a bounded memory; whatever else
+happens is
 kept under --keep, with the input.  NetCDF files are read in a child process each.  Not part of the test suite.
 """
 
@@ -29,10 +30,29 @@ from piazzi.io import cells, save, save_estimate
 from piazzi.scenarios import check, load_scenario, names, show
 
 SECONDS, MEMORY = 10, 3 * 2**30
-NUMBERS = ["9" * 400, *"0 -0.0 1e999 -1e308 nan inf 1e-320 0x10 1_0 true 1e --1 . -1 111111111111111111111111111".split()]
+NUMBERS = [
+    "9" * 400,
+    *[
+        "0",
+        "-0.0",
+        "1e999",
+        "-1e308",
+        "nan",
+        "inf",
+        "1e-320",
+        "0x10",
+        "1_0",
+        "true",
+        "1e",
+        "--1",
+        ".",
+        "-1",
+        "111111111111111111111111111",
+    ],
+]
 TOML = (
     '[ ] [[ ]] { } = , " """ \' # . x vx length length/time units km sigma variance covariance state truth role estimated mean '
-    "** atan2( __import__('os') é \\u0000 1979-05-27 9**9**9**9 max_step list method adaptive runge-kutta kepler manoeuvres delta_v"
+    "** atan2( __import__('os') é \\u0000 1979-05-27 9**9**9**9 max_step list method adaptive runge-kutta kepler manoeuvres delta_v"  # noqa: E501
 )
 TOKENS = {
     "scenario": [
@@ -48,7 +68,7 @@ TOKENS = {
         "(" * 2000,
     ],
     "csv": [
-        *'" , ,, # time station west truth:x [deg] [ é epoch'.split(),
+        *['"', ",", ",,", "#", "time", "station", "west", "truth:x", "[deg]", "[", "é", "epoch"],
         "\n",
         "\r",
         "\r\n",
@@ -58,8 +78,13 @@ TOKENS = {
         "\t",
         "# epoch = x\n",
     ],
-    "npz": ["PK\x03\x04", "PK\x05\x06", "\x93NUMPY", *"descr fortran_order shape <f8 |O >f4 <U9 ( ) True .npy".split()],
-    "nc": ["\x89HDF\r\n\x1a\n", *"SNOD TREE HEAP OHDR FRHP BTHD problem value".split()],
+    "npz": [
+        "PK\x03\x04",
+        "PK\x05\x06",
+        "\x93NUMPY",
+        *["descr", "fortran_order", "shape", "<f8", "|O", ">f4", "<U9", "(", ")", "True", ".npy"],
+    ],
+    "nc": ["\x89HDF\r\n\x1a\n", *["SNOD", "TREE", "HEAP", "OHDR", "FRHP", "BTHD", "problem", "value"]],
 }
 CSV = """
 states = ["x", "v"]
