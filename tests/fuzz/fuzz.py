@@ -3,8 +3,7 @@
 Mutates good files byte by byte, token by token and line by line; inside archives the members too, with their checksums made
 good again.  Inputs that are refused by a line that had refused none join the files to mutate, which leads the search deeper.
 A reader may return or raise ValueError or OSError with one printable line, within seconds and a bounded memory; whatever else
-happens is
-kept under --keep, with the input.  NetCDF files are read in a child process each.  Not part of the test suite.
+happens is kept under --keep, with the input.  NetCDF files are read in a child process each.  Not part of the test suite.
 """
 
 import argparse
@@ -30,62 +29,24 @@ from piazzi.io import cells, save, save_estimate
 from piazzi.scenarios import check, load_scenario, names, show
 
 SECONDS, MEMORY = 10, 3 * 2**30
-NUMBERS = [
-    "9" * 400,
-    *[
-        "0",
-        "-0.0",
-        "1e999",
-        "-1e308",
-        "nan",
-        "inf",
-        "1e-320",
-        "0x10",
-        "1_0",
-        "true",
-        "1e",
-        "--1",
-        ".",
-        "-1",
-        "111111111111111111111111111",
-    ],
-]
-TOML = (
-    '[ ] [[ ]] { } = , " """ \' # . x vx length length/time units km sigma variance covariance state truth role estimated mean '
-    "** atan2( __import__('os') é \\u0000 1979-05-27 9**9**9**9 max_step list method adaptive runge-kutta kepler manoeuvres delta_v"  # noqa: E501
-)
-TOKENS = {
-    "scenario": [
-        *TOML.split(),
-        "\n",
-        "\0",
-        "[truth]\n",
-        "[step]\n",
-        "[memory]\n",
-        "[[manoeuvres]]\n",
-        "a." * 50,
-        "[" * 2000,
-        "(" * 2000,
-    ],
-    "csv": [
-        *['"', ",", ",,", "#", "time", "station", "west", "truth:x", "[deg]", "[", "é", "epoch"],
-        "\n",
-        "\r",
-        "\r\n",
-        "\0",
-        "\ufeff",
-        " ",
-        "\t",
-        "# epoch = x\n",
-    ],
-    "npz": [
-        "PK\x03\x04",
-        "PK\x05\x06",
-        "\x93NUMPY",
-        *["descr", "fortran_order", "shape", "<f8", "|O", ">f4", "<U9", "(", ")", "True", ".npy"],
-    ],
-    "nc": ["\x89HDF\r\n\x1a\n", *["SNOD", "TREE", "HEAP", "OHDR", "FRHP", "BTHD", "problem", "value"]],
+WORDS = {
+    "numbers": "0 -0.0 1e999 -1e308 nan inf 1e-320 0x10 1_0 true 1e --1 . -1 111111111111111111111111111",
+    "scenario": '[ ] [[ ]] { } = , " """ \' # . x vx length length/time units km sigma variance covariance state truth '
+    "role mean estimated ** atan2( __import__('os') é \\u0000 1979-05-27 9**9**9**9 max_step list method adaptive runge-kutta "
+    "kepler delta_v",
+    "csv": '" , ,, # time station west truth:x [deg] [ é epoch',
+    "npz": "descr fortran_order shape <f8 |O >f4 <U9 ( ) True .npy",
+    "nc": "SNOD TREE HEAP OHDR FRHP BTHD problem about value",
 }
+MORE = {
+    "numbers": ["9" * 400],
+    "scenario": ["\n", "\0", "[truth]\n", "[step]\n", "[memory]\n", "[[manoeuvres]]\n", "a." * 50, "[" * 2000, "(" * 2000],
+    "csv": ["\n", "\r", "\r\n", "\0", "\ufeff", " ", "\t", "# epoch = x\n"],
+    "npz": ["PK\x03\x04", "PK\x05\x06", "\x93NUMPY"],
+    "nc": ["\x89HDF\r\n\x1a\n"],
+}
+TOKENS = {name: words.split() + MORE[name] for name, words in WORDS.items()}
+NUMBERS = TOKENS.pop("numbers")
 CSV = """
 states = ["x", "v"]
 dynamics = { x = "v", v = "0" }

@@ -100,6 +100,15 @@ def test_the_fast_way_and_the_careful_way_agree(rows, names):
         assert list(fast.lines) == careful.lines
 
 
+def test_names_that_look_like_numbers_stay_names():
+    """As in "station 007", the fast way and the careful way alike."""
+    body = b"0.0,007,1\n1.0,7,2\n2.0,1e3,3\n3.0,nan,4\n4.0,True,5"
+    header = ["time", "station", "range"]
+    for read_body in (cells.fast, cells.parse_rows):
+        table = read_body(body, 2, header, ())
+        assert [table.station_names[i] for i in table.station] == ["007", "7", "1e3", "nan", "True"]
+
+
 ALPHABET = st.sampled_from(
     [*"0123456789.,,,,\n\n+-eE _\"'#\r\t\0xaT", "nan", "inf", "True", "false", "1e", "west", "é", ",,", "1.5", "0x1", "١"]
 )

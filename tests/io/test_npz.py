@@ -127,6 +127,8 @@ class Evil:
         ({"Q": GOOD["Q"] + np.triu(np.ones((4, 4)), 1)}, "key 'Q' is not symmetric"),
         ({"P0": -GOOD["P0"]}, "key 'P0' must be positive semidefinite"),
         ({"P0": np.full((4, 4), np.nan)}, "key 'P0' has nan"),
+        ({"P0": np.diag([np.longdouble("1e4000")] * 4)}, "key 'P0' has inf"),
+        ({"P0": np.full((4, 4), 1e308) + np.triu(np.ones((4, 4)), 1) * 1e307}, "key 'P0' is not symmetric"),
         ({"x0": np.array([np.nan, 2e7, 4500, 0])}, "key 'x0' of 'x' is nan"),
         ({"x0": np.ones(3)}, "key 'x0' has 3 values"),
         ({"x0": np.zeros(4)}, "no finite value at the prior mean"),

@@ -312,18 +312,24 @@ def test_order_of_places(monkeypatch, tmp_path):
 
 
 def test_editing_any_source_of_a_kernel_is_noticed(monkeypatch, tmp_path):
-    """Each file of the expressions, the model and the kernels, by one byte."""
+    """Each file of the expressions, the model and the kernels, by one byte; of the fragments, those of the kernel alone."""
     shutil.copytree(PACKAGE, tmp_path / "piazzi", ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(spec, "HERE", tmp_path / "piazzi" / "kernels")
+    monkeypatch.setattr(spec, "_surroundings", spec._surroundings.__wrapped__)
+    monkeypatch.setattr(spec, "_fragment", spec._fragment.__wrapped__)
     files = [f for stage in ("expressions", "model", "kernels") for f in sorted((tmp_path / "piazzi" / stage).rglob("*.py"))]
-    assert any(f.parent.name == "fragments" for f in files)
-    before = spec._surroundings.__wrapped__()
-    assert before == spec._surroundings.__wrapped__()
+    own = {f"{name}.py" for name in SMALL.fragments}
+    assert {f.name for f in files if f.parent.name == "fragments"} > own
+    before = SMALL.digest()
+    assert before == SMALL.digest()
     seen = {before}
     for file in files:
         file.write_text(file.read_text() + "\n")
-        after = spec._surroundings.__wrapped__()
-        assert after not in seen, f"an edit of {file.name} goes unnoticed"
+        after = SMALL.digest()
+        if file.parent.name == "fragments" and file.name not in own:
+            assert after in seen, f"{file.name} is no part of the kernel"
+        else:
+            assert after not in seen, f"an edit of {file.name} goes unnoticed"
         seen.add(after)
 
 

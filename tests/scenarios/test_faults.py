@@ -77,7 +77,7 @@ def test_a_good_file_has_no_faults(checked):
         ("value = 2.0,", "value = inf,", "parameters.k.value", "must be a finite number, not inf"),
         ('k = { value = 2.0, unit = "1/s**2" }', "x = 1.0\nk = 2.0", "parameters.x", "is also a state"),
         ('range = { equation = "x", unit = "m" }', 'range = "atan2(x, v)"', "sensors.radar.components.range", "wraps"),
-        ('range = { equation = "x", unit = "m" }', 'range = "mx"', "sensors.radar.components.range", "unknown name 'mx'"),
+        ('range = { equation = "x", unit = "m" }', 'range = "mx"', "sensors.radar.components.range", "each station's own"),
         (
             "[sensors.radar.components]",
             "[sensors.radar]\nnumbers = ['mx']\n[sensors.radar.components]",

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
 from piazzi.evaluate import metrics
+from piazzi.io.netcdf import read_estimate, write_estimate
 from tests.laws.problems import b612, linear, random_covariance, random_stable
 from tests.references import textbook
 
@@ -157,6 +158,16 @@ def test_gate_rejects_outliers_and_reports_them(outliers):
     )
     assert_allclose(estimate.mean, without.mean, rtol=0, atol=1e-12)
     assert_allclose(estimate.covariance, without.covariance, rtol=0, atol=1e-12)
+
+
+def test_a_file_keeps_what_was_rejected(outliers, tmp_path):
+    problem, tracking, _ = outliers
+    estimate = pz.ExtendedKalmanFilter(gate=0.999).estimate(problem, tracking)
+    write_estimate(tmp_path / "a.nc", estimate)
+    again = read_estimate(tmp_path / "a.nc")
+    assert again.details["rejected"].dtype == bool
+    assert_array_equal(again.details["rejected"], estimate.details["rejected"])
+    assert metrics.nis(again).mean() == metrics.nis(estimate).mean()
 
 
 def test_without_gate_outliers_hurt(outliers):

@@ -84,7 +84,7 @@ def nis(estimate: Estimate) -> Consistency:
     """Normalised innovation squared, nu^T S^-1 nu, of every row of measurements, (J,), over the components that are there."""
     measured = ~np.isnan(estimate.tracking.padded(estimate.innovations.shape[1]))
     if "rejected" in estimate.details:  # a gate's outliers say nothing about what the filter used
-        measured &= ~estimate.details["rejected"][:, None]
+        measured &= ~np.asarray(estimate.details["rejected"], dtype=bool)[:, None]
     return squared_in_sigmas(estimate.innovations, estimate.innovation_covariances, measured)
 
 

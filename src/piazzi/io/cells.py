@@ -17,7 +17,8 @@ from piazzi.scenarios.faults import shown
 STATION = "station"
 MAX_BYTES = 2**32
 MAX_COLUMNS = 1000
-_ODD = (b'"', b"\r", b"\0", b"rue", b"RUE", b"alse", b"ALSE")  # true and false are numbers to pandas, but not to us
+_ODD = (b'"', b"\r", b"\0")
+_WORDS = (b"rue", b"RUE", b"alse", b"ALSE")  # true and false are numbers to pandas, but not to us
 SMALL = 2**19  # bytes for which the careful way takes less time than importing pandas
 
 
@@ -117,6 +118,8 @@ def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -
     except (ValueError, OverflowError):  # among them all of pandas' own errors of parsing
         return None
     numbers = {name: np.ascontiguousarray(table[i], dtype=float) for i, name in enumerate(header) if name != STATION}
+    if any(_is_binary(column) for column in numbers.values()) and any(word in body for word in _WORDS):
+        return None
     station: Array | None = None
     names: tuple[str, ...] = ()
     if STATION in header:
@@ -137,6 +140,11 @@ def _is_regular(body: bytes, columns: int) -> bool:
         return False
     table = commas.reshape(len(ends), columns - 1)
     return bool((table >= starts[:, None]).all() and (table <= ends[:, None]).all())
+
+
+def _is_binary(column: Array) -> bool:
+    """Whether there is nothing in a column but 0 and 1."""
+    return all(bool(((part == 0) | (part == 1) | np.isnan(part)).all()) for part in (column[:100], column))
 
 
 def _merged(index: Array, given: list[str]) -> tuple[Array, tuple[str, ...]]:

@@ -144,13 +144,19 @@ def _estimate(group: Any, problem: Problem, tracking: Tracking, delayed: Estimat
     _raise_first(faults)
     if view is None or iterations is None or seconds is None:
         raise ValueError("variable 'about' lacks the view, the iterations or the seconds of the estimate")
-    details |= {key.removeprefix(DETAIL): hdf5.array(group, key) for key in group if key.startswith(DETAIL)}
+    details |= {key.removeprefix(DETAIL): _detail(group, key) for key in group if key.startswith(DETAIL)}
     return Estimate(
         problem, tracking,
         _shaped(group, "mean", (K, n)), _shaped(group, "covariance", (K, n, n)),
         _shaped(group, "innovation", (J, m)), _shaped(group, "innovation_covariance", (J, m, m)),
         int(iterations), seconds, cast(View, view), delayed, details, failure or "",
     )  # fmt: skip
+
+
+def _detail(group: Any, name: str) -> Array | None:
+    """An array of the details; the format keeps what is true or false as bytes."""
+    found = hdf5.array(group, name)
+    return found.astype(bool) if found is not None and found.dtype == np.int8 else found
 
 
 def _raise_first(faults: Faults) -> None:

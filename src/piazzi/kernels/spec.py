@@ -27,14 +27,15 @@ class KernelSpec:
 
     def digest(self) -> str:
         """Hash of everything that the compiled module depends on, this machine and the generator's own text included."""
-        return hashlib.sha256(repr((self, _surroundings())).encode()).hexdigest()[:32]
+        own = tuple(_fragment(name) for name in self.fragments)
+        return hashlib.sha256(repr((self, own, _surroundings())).encode()).hexdigest()[:32]
 
     def source(self, backend: str) -> str:
         """The module's source for the "compiled" or the "plain" vocabulary."""
         from piazzi.kernels.generate import model_source
 
         head = BANNER + f"from piazzi.kernels.{backend} import *\n\n\n"
-        body = "\n\n".join(_without_imports((HERE / "fragments" / f"{name}.py").read_text()) for name in self.fragments)
+        body = "\n\n".join(_without_imports(_fragment(name)) for name in self.fragments)
         return head + model_source(self.model, self.scheme, self.lanes if backend == "compiled" else 1) + body
 
 
@@ -63,8 +64,16 @@ def _without_imports(text: str) -> str:
 
 
 @cache
+def _fragment(name: str) -> str:
+    return (HERE / "fragments" / f"{name}.py").read_text()
+
+
+@cache
 def _surroundings() -> tuple[str, ...]:
-    """Versions, processor and the text of every file that shapes a kernel (Numba does not notice an edited import)."""
+    """Versions, processor and the text of every file that shapes all kernels (Numba does not notice an edited import).
+
+    Fragments are left out: a module depends on its own only.
+    """
     import platform
     import sys
     from importlib.metadata import version
@@ -73,6 +82,8 @@ def _surroundings() -> tuple[str, ...]:
 
     text = hashlib.sha256()
     for file in sorted(f for stage in ("expressions", "model", "kernels") for f in (HERE.parent / stage).rglob("*.py")):
+        if file.parent.name == "fragments":
+            continue
         text.update(file.name.encode() + b"\0" + file.read_bytes())
     features = llvm.get_host_cpu_features().flatten()
     packages = [f"{p} {version(p)}" for p in ("numba", "llvmlite", "sympy")]

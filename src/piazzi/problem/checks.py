@@ -23,7 +23,8 @@ def numeric(value: Any, what: str) -> Array:
         out = np.asarray(value)
         if out.dtype.kind not in "biuf":
             raise TypeError(f"it has type {out.dtype}")
-        return np.array(out, dtype=float)
+        with np.errstate(over="ignore", invalid="ignore"):  # of longer doubles, and of signalling NaN
+            return np.array(out, dtype=float)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what} is not made of real numbers: {error}") from None
 
@@ -60,8 +61,9 @@ def covariance(value: Any, n: int, what: str, names: Sequence[str], *, definite:
 
 def _check_symmetric(a: Array, what: str, names: Sequence[str]) -> None:
     sigma = np.sqrt(np.abs(np.diag(a)))
-    scale = np.outer(sigma, sigma) + np.abs(a) + np.abs(a.T)
-    off = np.abs(a - a.T) > 1e-9 * scale
+    quarter = 0.25 * a  # so that sums of the largest numbers do not overflow
+    scale = np.outer(0.5 * sigma, 0.5 * sigma) + np.abs(quarter) + np.abs(quarter.T)
+    off = np.abs(quarter - quarter.T) > 1e-9 * scale
     if off.any():
         i, j = np.argwhere(off)[0]
         raise ValueError(

@@ -15,6 +15,7 @@ from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import ONE, Unit, Units
 
 MAX_STATES = 100
+OWN = "; numbers of each station's own are named in the sensor's numbers"
 
 
 @dataclass
@@ -173,8 +174,8 @@ def _dynamics(file: Table, out: Physics) -> dict[str, str]:
     return equations
 
 
-def equation(table: Table, key: str, allowed: Collection[str]) -> str:
-    """The text of an equation in which only these names occur."""
+def equation(table: Table, key: str, allowed: Collection[str], hint: str = "") -> str:
+    """The text of an equation in which only these names occur; `hint` says what else an unknown one could be."""
     value = table.raw(key)
     if value is None:
         return "0"
@@ -182,8 +183,10 @@ def equation(table: Table, key: str, allowed: Collection[str]) -> str:
     if not isinstance(text, str):
         table.fault(key, f"must be an equation in quotes, not {shown(value)}")
         return "0"
-    with table.faults.at(table.at(key)):
+    try:
         check(text, allowed)
+    except ValueError as error:
+        table.fault(key, f"{error}{hint if 'unknown name' in str(error) else ''}")
     return text
 
 
@@ -212,7 +215,7 @@ def _sensor(name: str, table: Table, units: Units, out: Physics) -> Sensor | Non
 def _component(table: Table, key: str, allowed: Collection[str], units: Units) -> tuple[str, Unit, bool]:
     """Equation and unit of a component, and whether it is an angle, which wraps."""
     if not isinstance(table.raw(key), Mapping):
-        text = equation(table, key, allowed)
+        text = equation(table, key, allowed, OWN)
         if units.declared:
             table.fault(key, f"has no unit, but the file is not in SI: write {{ equation = ..., unit = {_example(units)} }}")
         if "atan2" in text:
@@ -221,7 +224,7 @@ def _component(table: Table, key: str, allowed: Collection[str], units: Units) -
     inner = table.table(key)
     if "equation" not in inner:
         inner.fault("equation", "is missing")
-    text = equation(inner, "equation", allowed)
+    text = equation(inner, "equation", allowed, OWN)
     unit = unit_of(inner, "unit", units)
     angle = inner.flag("angle", unit.is_angle)
     if "atan2" in text and "unit" not in inner and "angle" not in inner:

@@ -13,6 +13,7 @@ from piazzi.problem.checks import Array
 from piazzi.scenarios.faults import Faults, joined, shown
 
 MAX_TABLES = 1000
+MAX_UNKNOWN = 50
 
 
 class Table:
@@ -42,9 +43,11 @@ class Table:
     def finish(self, known: Collection[str] = ()) -> None:
         """Note every key that was neither read nor is known."""
         valid = sorted({*self._read, *known})
-        for key in self.data:
-            if key not in self._read and key not in known:
-                self.fault(key, f"unknown key{nearest(key[:60], valid)}")
+        unknown = [key for key in self.data if key not in valid]
+        for key in unknown[:MAX_UNKNOWN]:
+            self.fault(key, f"unknown key{nearest(key[:60], valid)}")
+        if len(unknown) > MAX_UNKNOWN:
+            self.fault("", f"has {len(unknown) - MAX_UNKNOWN} more unknown keys")
 
     # ---- single values -------------------------------------------------------------------------------------------
 
