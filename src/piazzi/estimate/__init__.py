@@ -6,6 +6,7 @@ from piazzi.estimate.kalman import ExtendedKalmanFilter, Prediction, Updated, pr
 from piazzi.estimate.live import LiveFilter
 from piazzi.estimate.live_window import LiveWindow
 from piazzi.estimate.sliding_window import SlidingWindow
+from piazzi.estimate.smoother import Smoother
 
 __all__ = [
     "Estimate",
@@ -16,6 +17,7 @@ __all__ = [
     "LiveWindow",
     "Prediction",
     "SlidingWindow",
+    "Smoother",
     "Updated",
     "predict",
     "update",

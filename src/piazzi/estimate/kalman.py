@@ -83,7 +83,7 @@ class ExtendedKalmanFilter:
         watch = Stopwatch()
         mean, P, nu, S, rejected = guarded_run(problem, inputs, update_fragments(problem, self.update), self.guard)
         seconds = watch.seconds()
-        _check_start(problem, inputs, mean)
+        check_start(problem, inputs, mean[0])
         out = rejected.astype(bool)
         out.setflags(write=False)
         details = {} if self.gate is None else {"rejected": out, "rejected_count": int(out.sum())}
@@ -120,13 +120,13 @@ def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tup
         S,
     )
     seconds = time.perf_counter() - started
-    _check_start(problem, inputs, mean)
+    check_start(problem, inputs, mean[0])
     return mean, P, nu, S, seconds
 
 
-def _check_start(problem: Problem, inputs: Inputs, mean: Array) -> None:
-    """Raise ValueError where the very first update failed: the prior itself is finite."""
-    if all(map(isfinite, mean[0].tolist())) or inputs.t_prior != inputs.t[0]:
+def check_start(problem: Problem, inputs: Inputs, first: Array) -> None:
+    """Raise ValueError where the very first update failed, so that `first` is not finite: the prior itself is."""
+    if all(map(isfinite, first.tolist())) or inputs.t_prior != inputs.t[0]:
         return
     names = sorted({problem.stations[s].name for s in inputs.station[: inputs.first_row[1]]})
     at = ", ".join(f"{name} = {value:g}" for name, value in zip(problem.model.names, problem.mean, strict=True))

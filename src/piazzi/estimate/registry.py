@@ -57,6 +57,12 @@ def _start(option: str) -> Mapping[str, Any]:
     return {"start": option} if option else {}
 
 
+def _plain(option: str) -> Mapping[str, Any]:
+    if option:
+        raise ValueError("it has no options")
+    return {}
+
+
 def _window(option: str) -> Mapping[str, Any]:
     found = re.fullmatch(r"(\d{1,9})(?:x(\d{1,9}))?", option, re.ASCII)
     if option and not found:
@@ -78,6 +84,13 @@ ESTIMATORS: Mapping[str, Entry] = {
         "piazzi.estimate.kalman:ExtendedKalmanFilter",
         ("realtime",),
         _iterated,
+    ),
+    "smoother": Entry(
+        "smoother",
+        "fixed-interval smoother: the extended Kalman filter forward, and once back",
+        "piazzi.estimate.smoother:Smoother",
+        ("delayed",),
+        _plain,
     ),
     "graph": Entry(
         "graph[:ekf|:prior|:window]",

@@ -1,0 +1,85 @@
+"""The fixed-interval smoother: the extended Kalman filter forward, and once back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.estimate.chain import chain_fragments
+from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.inputs import prepare, scratch
+from piazzi.estimate.kalman import check_start
+from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.problem import Problem, Tracking
+
+
+@dataclass(frozen=True)
+class Smoother:
+    """Every state given all measurements, linearised once, along the extended Kalman filter.
+
+    Parameters
+    ----------
+    cross_covariances : bool
+        Keep Cov(x[k], x[k+1]) as ``details["cross_covariances"]``, shape (K - 1, n, n).
+
+    Notes
+    -----
+    Rauch, Tung and Striebel (AIAA Journal 3, 1965), in the form of Bryson and Frazier (1963), which divides by no predicted
+    covariance: process noise may be singular or zero.  The last state is the filter's.  Where the filter was far off, so is the
+    linearisation; `FactorGraph` repeats it until nothing moves, and equals this smoother on linear problems.
+    """
+
+    cross_covariances: bool = False
+
+    def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
+        """Smoothed means and covariances at every epoch; innovations are the filter's.
+
+        Raises
+        ------
+        ValueError
+            Where the tracking does not fit the problem.
+        """
+        inputs = prepare(problem, tracking)
+        library = kernels.load(problem.spec(*chain_fragments(problem, "smoother")))
+        K, n, (J, m) = inputs.epochs, problem.model.n, inputs.z.shape
+        mean, covariance, cross = np.empty((K, n)), np.empty((K, n, n)), np.empty((max(K - 1, 1), n, n))
+        nu, S = np.empty((J, m)), np.empty((J, m, m))
+        most = int(np.diff(inputs.first_row).max()) * m
+        watch = Stopwatch()
+        library.run_smoother(
+            K,
+            inputs.t,
+            inputs.t_prior,
+            inputs.count,
+            inputs.scale,
+            *inputs.measured(problem),
+            problem.given,
+            problem.process_noise.covariance,
+            problem.mean,
+            problem.covariance,
+            *scratch(problem),
+            np.empty((K, n, n)),
+            np.empty((K if problem.noise_varies else 1, n, n)),
+            np.empty((J, m)),
+            np.empty((J, m, n)),
+            np.empty((K, n)),
+            np.empty((K, n, n)),
+            np.empty((most, n + 1)),
+            np.empty((n, n)),
+            np.empty((n, n)),
+            int(self.cross_covariances),
+            mean,
+            covariance,
+            cross,
+            nu,
+            S,
+        )
+        seconds = watch.seconds()
+        first = slice(inputs.first_row[1])
+        seen = ~np.isnan(inputs.z[first])
+        check_start(problem, inputs, (nu[first] + np.diagonal(S[first], axis1=1, axis2=2))[seen])
+        details: dict[str, Any] = {"cross_covariances": cross[: K - 1]} if self.cross_covariances else {}
+        return Estimate(problem, tracking, mean, covariance, nu, S, K, seconds, "delayed", details=details)
