@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from piazzi.kernels.fragments import decorrelate, graph, marginals
+from piazzi.kernels.fragments import decorrelate, graph_linearize, marginals
 from tests.laws.problems import random_covariance
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -18,7 +18,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 def sizes(n, m=1):
     """Fragments run uncompiled; the sizes that the generated module would give them are set here."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (decorrelate, graph, marginals):
+        for module in (decorrelate, graph_linearize, marginals):
             patch.setattr(module, "N", n, raising=False)
             patch.setattr(module, "M", m, raising=False)
         yield
@@ -33,7 +33,7 @@ def test_process_noise(n, rank, seed):
     assume(rank == 0 or np.linalg.eigvalsh(Q[:rank, :rank])[0] > 1e-3)
     L, D = np.empty(n * n), np.empty(n)
     with sizes(n):
-        graph.factor_noise(Q, L, D)
+        graph_linearize.factor_noise(Q, L, D)
     lower = np.tril(L.reshape(n, n), -1) + np.eye(n)
     assert_allclose(lower @ np.diag(D) @ lower.T, Q, rtol=0, atol=1e-12 * max(np.abs(Q).max(), 1e-300))
     assert np.count_nonzero(D) == rank
@@ -49,8 +49,8 @@ def test_cost_of_a_defect_is_the_square_of_its_whitened_length(n, seed, scale):
     Q, defect = random_covariance(rng, n), rng.standard_normal(n)
     L, D, y, broken, report = np.empty(n * n), np.empty(n), np.empty(n), np.ones(n), np.zeros(4)
     with sizes(n):
-        graph.factor_noise(Q, L, D)
-        graph.weigh(defect, scale, L, D, 0, np.eye(n).ravel(), y, broken, report, 1)
+        graph_linearize.factor_noise(Q, L, D)
+        graph_linearize.weigh(defect, scale, L, D, 0, np.eye(n).ravel(), y, broken, report, 1)
     white = np.linalg.solve(np.linalg.cholesky(scale * Q), defect)
     assert_allclose(report[1], white @ white, rtol=1e-8)
     assert report[3] == 0.0

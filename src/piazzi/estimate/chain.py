@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.inputs import Inputs
+from piazzi.kernels import Discrete, KernelSpec
 from piazzi.kernels.spec import machine_lanes
+from piazzi.model import Model, Sensor
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
@@ -24,6 +27,7 @@ def chain_fragments(problem: Problem, *last: str) -> tuple[str, ...]:
         "transition",
         problem.noise_fragment,
         f"linearize_{kind}",
+        f"chain_noise_{kind}",
         "decorrelate",
         "linearize",
         "update_components",
@@ -33,6 +37,15 @@ def chain_fragments(problem: Problem, *last: str) -> tuple[str, ...]:
         "marginals",
         *last,
     )
+
+
+@lru_cache(maxsize=64)
+def solve_spec(n: int, width: int, noise_varies: bool) -> KernelSpec:
+    """The kernels that solve a linearised chain: they depend on its sizes only, so all models of one size share them."""
+    names = tuple(f"s{i}" for i in range(n))
+    sizes = Model(names, ("0",) * n, (Sensor("any", ["0"] * width),), discrete=True)
+    noise = f"chain_noise_{'integral' if noise_varies else 'scaled'}"
+    return KernelSpec(sizes, Discrete().scheme, ("matrices", noise, "chain", "marginals", "graph"))
 
 
 def tether_of(problem: Problem) -> Array:
@@ -46,8 +59,9 @@ class Chain:
 
     def __init__(self, problem: Problem, inputs: Inputs) -> None:
         self.problem, self.inputs = problem, inputs
-        self.library = kernels.load(problem.spec(*chain_fragments(problem, "graph"), lanes=machine_lanes()))
+        self.library = kernels.load(problem.spec(*chain_fragments(problem, "graph_linearize"), lanes=machine_lanes()))
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
+        self.solving = kernels.load(solve_spec(N, M, problem.noise_varies))
         J = len(inputs.z)
         self.x, self.f, self.Phi = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N))
         self.Q_all = np.empty((K if problem.noise_varies else 1, N, N))
@@ -94,7 +108,7 @@ class Chain:
     def widest(self) -> float:
         """Largest predicted variance of a measurement in units of its noise, after a solve."""
         i = self.inputs
-        self.library.graph_probe(i.epochs, i.first_row, self.nu, self.H, self.P_pred, self.report)
+        self.solving.graph_probe(i.epochs, i.first_row, self.nu, self.H, self.P_pred, self.report)
         return float(self.report[WIDEST])
 
     def innovations(self) -> tuple[Array, Array]:
@@ -145,7 +159,7 @@ class CovarianceSolver:
 
     def solve(self, damping: float) -> None:
         c, i, p = self.chain, self.chain.inputs, self.chain.problem
-        c.library.graph_solve(
+        c.solving.graph_solve(
             i.epochs,
             i.scale,
             i.first_row,
@@ -181,7 +195,7 @@ class CovarianceSolver:
     def _marginals(self, cross: Array, keep_cross: bool) -> Array:
         c, i, N = self.chain, self.chain.inputs, self.chain.problem.model.n
         covariance = np.empty((i.epochs, N, N))
-        c.library.graph_marginals(
+        c.solving.graph_marginals(
             i.epochs,
             i.scale,
             i.first_row,
@@ -211,7 +225,7 @@ class InformationSolver:
     def __init__(self, chain: Chain) -> None:
         self.chain = chain
         K, N = chain.inputs.epochs, chain.problem.model.n
-        fragments = chain_fragments(chain.problem, "graph", "information", "graph_information")
+        fragments = chain_fragments(chain.problem, "graph_linearize", "information", "graph_information")
         self.library = kernels.load(chain.problem.spec(*fragments, lanes=machine_lanes()))
         self.root = np.ascontiguousarray(np.linalg.solve(np.linalg.cholesky(chain.problem.covariance), np.eye(N)))
         square, vector = (N, N), (N,)

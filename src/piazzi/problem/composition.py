@@ -15,7 +15,7 @@ def composed(problem: Problem, fragments: tuple[str, ...]) -> tuple[str, ...]:
 
     "transition" becomes the motion of the integrator and the events on the way; "noise_scaled" and "noise_integral" become the
     axes of the noise, its integration and the same events; "linearize_scaled" is replaced where states cannot be worked on
-    together, or where the noise is not a multiple of one matrix.
+    together; that and "chain_noise_scaled" where the noise is not a multiple of one matrix.
     """
     integrator = problem.integrator
     assert integrator is not None
@@ -25,9 +25,10 @@ def composed(problem: Problem, fragments: tuple[str, ...]) -> tuple[str, ...]:
     together = integrator.in_lanes and not events
     linearize = "linearize_integral" if problem.noise_varies else "linearize_scaled" if together else "linearize_each"
     parts = {
-        "transition": (*integrator.fragments, f"transition{events}"),
+        "transition": ("matrices", *integrator.fragments, f"transition{events}"),
         "noise_scaled": (axes, "noise_scaled", f"advance{events}"),
         "noise_integral": (axes, integral, f"advance{events}"),
         "linearize_scaled": (linearize,),
+        "chain_noise_scaled": (f"chain_noise_{'integral' if problem.noise_varies else 'scaled'}",),
     }
     return tuple(part for name in fragments for part in parts.get(name, (name,)))

@@ -4,11 +4,6 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def Q_matrix(Q):
-    return load_matrix(Q, 0, N, N)
-
-
-@inline
 def record_epoch(k, t, first_row, z, station, sensor, numbers, R, p, x, d, P, nu, H, innovation, innovation_covariance):
     """z - h(x) - H d and H P H^T + R of all rows of epoch k, for predicted deviation d from x."""
     for row in range(first_row[k], first_row[k + 1]):

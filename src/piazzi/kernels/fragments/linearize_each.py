@@ -4,18 +4,6 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def noise_at(j, scale, Q, Q_all):
-    """Process noise of the step that ends at state j of the stretch, whose scale is given."""
-    return scale * Q
-
-
-@inline
-def noise_varies():
-    """Whether the noise changes its shape from step to step."""
-    return 0
-
-
-@inline
 def linearize_dynamics(a, W, t, count, scale, p, Q, x, f, Phi, Q_all):
     """f and Phi of states a ... a + W - 2 at their current values, stored from position 0."""
     for j in range(W - 1):

@@ -4,12 +4,6 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def symmetric(P):
-    """The symmetric part; rounding must not grow into an asymmetry."""
-    return 0.5 * (P + P.T)
-
-
-@inline
 def travel(t, dt, count, x, p):
     """The state `dt` seconds later."""
     return coast(t, dt, count, remember(x), p)

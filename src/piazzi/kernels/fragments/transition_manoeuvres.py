@@ -8,12 +8,6 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def symmetric(P):
-    """The symmetric part; rounding must not grow into an asymmetry."""
-    return 0.5 * (P + P.T)
-
-
-@inline
 def manoeuvre(i):
     """Position in `p` of manoeuvre `i`."""
     return GIVEN + 1 + i * (1 + N + N * N)
