@@ -24,6 +24,7 @@ simulation
 estimate
 io loading
 evaluate
+study
 present
 __init__
 cli

@@ -210,6 +210,8 @@ PACKS: dict[str, tuple[str, Callable[..., np.ndarray]]] = {
     "outer product": ("outer(u, v)", lambda A, B, u, v, s, q, C, c, k: np.outer(u, v)),
     "vector of packs and numbers": ("vector(s, 1.0, q)", lambda A, B, u, v, s, q, C, c, k: np.array([s, 1.0, q])),
     "matrix of both kinds of rows": ("matrix(u, c)", lambda A, B, u, v, s, q, C, c, k: np.array([u, c])),
+    "whole number above": ("ceil(4 * s) + ceil(k)", lambda A, B, u, v, s, q, C, c, k: np.ceil(4 * s) + np.ceil(k)),
+    "wrapped angle": ("wrap_angle(9 * s)", lambda A, B, u, v, s, q, C, c, k: np.angle(np.exp(9j * s))),
     "larger": ("maximum(s, 0.2)", lambda A, B, u, v, s, q, C, c, k: np.maximum(s, 0.2)),
     "smaller": ("minimum(s, q)", lambda A, B, u, v, s, q, C, c, k: np.minimum(s, q)),
     "sign": ("sign(s)", lambda A, B, u, v, s, q, C, c, k: np.sign(s)),
@@ -269,6 +271,24 @@ def test_lanes_are_independent_problems(n, w):
             expected = meaning(**of_lane(given, lane))
             assert_allclose(results[name][lane], expected, rtol=1e-13, atol=1e-13, err_msg=f"{name}, lane {lane}")
     assert_array_equal(results.guards(), GUARD)
+
+
+@pytest.mark.parametrize("w", LANES)
+def test_packs_are_stored_lane_beside_lane(w):
+    """Entry i of lane l at i w + l, whatever is of one problem in all lanes; and back the same."""
+    from piazzi.kernels.compiled import load_lanes, load_packs, load_vector, store_packs
+
+    def through(a, c, out, back):
+        store_packs(out, 1, load_lanes(a, 0, 3, 3, w), w)
+        store_packs(out, 3 * w + 1, load_vector(c, 0, 2), w)
+        store_packs(back, 0, load_packs(out, 1, 3, w), w)
+
+    a, c, out, back = np.arange(3.0 * w), np.array([-1.0, -2.0]), np.full(5 * w + 2, GUARD), np.zeros(3 * w)
+    call(through, a, c, out, back)
+    assert_array_equal(out[1 : 3 * w + 1].reshape(3, w), a.reshape(w, 3).T)
+    assert_array_equal(out[3 * w + 1 : -1].reshape(2, w), np.repeat(c[:, None], w, axis=1))
+    assert_array_equal(back, out[1 : 3 * w + 1])
+    assert_array_equal(out[[0, -1]], GUARD)
 
 
 def test_what_has_no_meaning_is_refused():

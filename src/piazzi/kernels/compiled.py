@@ -9,10 +9,12 @@ from typing import Any
 from numba import cfunc, njit, types
 
 from piazzi.kernels.lanes import (
+    ceil,
     heaviside,
     identity,
     load_lanes,
     load_matrix,
+    load_packs,
     load_vector,
     matrix,
     maximum,
@@ -21,11 +23,11 @@ from piazzi.kernels.lanes import (
     sign,
     store,
     store_lanes,
+    store_packs,
     unit,
     vector,
 )
 from piazzi.kernels.plain import unless_missing as _unless_missing
-from piazzi.kernels.plain import wrap_angle as _wrap_angle
 
 # "contract" lets a*b + c round once; nothing else of fast-math, so that NaN keeps meaning "missing"
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
@@ -50,4 +52,10 @@ def entry(function: Callable[..., Any]) -> Any:
     return cfunc(types.void(*(_SCALARS.get(k, k) for k in kinds)), **OPTIONS)(function)
 
 
-wrap_angle, unless_missing = inline(_wrap_angle), inline(_unless_missing)
+unless_missing = inline(_unless_missing)
+
+
+@inline
+def wrap_angle(a: Any) -> Any:
+    """The same angle in (-pi, pi], in every lane."""
+    return a - 2.0 * pi * ceil((a - pi) / (2.0 * pi))

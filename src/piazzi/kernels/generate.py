@@ -9,6 +9,7 @@ Sizes: `ND` states, `N` values with the estimated constants, `M` components of t
 * ``complete(R)``: R with the constants' rows below it
 * ``measure_into(sensor, t, x, p, s, at, out, row)``: h
 * ``innovate(sensor, t, x, p, s, at, z, row, nu, H, out)``: z - h, angles wrapped, and H
+* ``measure_lanes(sensor, t, x, p, s, at, h)``, ``innovate_lanes(sensor, t, x, p, s, at, z, nu, H)``: the same of `LANES` runs
 """
 
 from __future__ import annotations
@@ -161,6 +162,7 @@ def _map_source(model: Model, nxt: Sequence[sp.Expr], h: sp.Symbol) -> str:
 
 def _sensor_source(model: Model) -> str:
     functions, measure, innovate = [], [], []
+    measure_lanes, innovate_lanes = [], []
     for index, sensor in enumerate(model.sensors):
         h, H, own = derive_sensor(model, sensor)
         arguments, names, call = _arguments(model)
@@ -183,10 +185,20 @@ def _sensor_source(model: Model) -> str:
             innovate.append(f"    nu[out + {i}] = unless_missing(z[row + {i}], {difference})")
             innovate.append(f"    store(H, (out + {i}) * {model.n}, {J.dense_row(i)})")
         innovate += [f"    nu[out + {i}] = nan" for i in range(sensor.width, model.width)]
+        measure_lanes += [guard, "    " + _unpack(seen, f"scalar_h{index}({call})")]
+        measure_lanes.append(f"    store_packs(h, 0, vector({', '.join(seen)}), LANES)")
+        innovate_lanes += [guard, "    " + _unpack(seen + J.names, f"scalar_h{index}_H({call})")]
+        for i, angle in enumerate(sensor.is_angle):
+            difference = f"load_packs(z, {i} * LANES, 1, LANES)[0] - h{i}"
+            difference = f"wrap_angle({difference})" if angle else difference
+            innovate_lanes.append(f"    store_packs(nu, {i} * LANES, vector({difference}), LANES)")
+            innovate_lanes.append(f"    store_packs(H, {i * model.n} * LANES, {J.dense_row(i)}, LANES)")
     if not model.sensors:
-        measure, innovate = ["pass"], ["pass"]
+        measure, innovate, measure_lanes, innovate_lanes = ["pass"], ["pass"], ["pass"], ["pass"]
     return (
         "".join(functions)
         + _inline("measure_into(sensor, t, x, p, s, at, out, row)", *measure)
         + _inline("innovate(sensor, t, x, p, s, at, z, row, nu, H, out)", *innovate)
+        + _inline("measure_lanes(sensor, t, x, p, s, at, h)", *measure_lanes)
+        + _inline("innovate_lanes(sensor, t, x, p, s, at, z, nu, H)", *innovate_lanes)
     )

@@ -13,7 +13,7 @@ from numpy import arccos as acos
 from numpy import arcsin as asin
 from numpy import arctan as atan
 from numpy import arctan2 as atan2
-from numpy import cos, cosh, exp, fabs, log, sin, sinh, sqrt, tan, tanh
+from numpy import ceil, cos, cosh, exp, fabs, log, sin, sinh, sqrt, tan, tanh
 from numpy import power as pow  # noqa: A004
 
 Array = np.ndarray[Any, Any]
@@ -85,6 +85,16 @@ def store_lanes(a: Array, at: int, stride: int, value: Array) -> None:
     store(a, at, value)
 
 
+def load_packs(a: Array, at: int, n: int, w: int) -> Array:
+    """The vector of `n` numbers at `at`."""
+    return load_vector(a, at, n)
+
+
+def store_packs(a: Array, at: int, value: Array, w: int) -> None:
+    """Write a vector or matrix from position `at`."""
+    store(a, at, value)
+
+
 def sign(x: float) -> float:
     """-1, 0 or 1."""
     return (x > 0.0) * 1.0 - (x < 0.0) * 1.0
@@ -107,7 +117,7 @@ def minimum(x: float, y: float) -> float:
 
 def wrap_angle(a: float) -> float:
     """The same angle in (-pi, pi]."""
-    return a - 2.0 * pi * np.ceil((a - pi) / (2.0 * pi))  # type: ignore[no-any-return]
+    return a - 2.0 * pi * ceil((a - pi) / (2.0 * pi))  # type: ignore[no-any-return]
 
 
 def unless_missing(z: float, nu: float) -> float:

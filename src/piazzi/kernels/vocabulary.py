@@ -31,6 +31,8 @@ remember: Any
 complete: Any
 measure_into: Any
 innovate: Any
+measure_lanes: Any
+innovate_lanes: Any
 # written in fragments/coast_*.py, noise_*.py, axes*.py, transition*.py, update_*.py
 coast: Any
 coast_jacobian: Any
@@ -77,3 +79,8 @@ back_information: Any
 judge: Any
 surprise: Any
 update_epoch_guarded: Any
+# written in fragments/*_lanes.py
+travel_lanes: Any
+transition_lanes: Any
+squared_lanes: Any
+nees_lanes: Any

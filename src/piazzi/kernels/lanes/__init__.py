@@ -1,17 +1,19 @@
 """Small vectors and matrices in SIMD registers, for Numba."""
 
 import piazzi.kernels.lanes.operators  # noqa: F401  (registers + - * @ with Numba)
-from piazzi.kernels.lanes.functions import heaviside, maximum, minimum, sign
+from piazzi.kernels.lanes.functions import ceil, heaviside, maximum, minimum, sign
 from piazzi.kernels.lanes.kinds import Matrix, Pack, Vector, element
 from piazzi.kernels.lanes.memory import (
     identity,
     load_lanes,
     load_matrix,
+    load_packs,
     load_vector,
     matrix,
     outer,
     store,
     store_lanes,
+    store_packs,
     unit,
     vector,
 )
@@ -20,11 +22,13 @@ __all__ = [
     "Matrix",
     "Pack",
     "Vector",
+    "ceil",
     "element",
     "heaviside",
     "identity",
     "load_lanes",
     "load_matrix",
+    "load_packs",
     "load_vector",
     "matrix",
     "maximum",
@@ -33,6 +37,7 @@ __all__ = [
     "sign",
     "store",
     "store_lanes",
+    "store_packs",
     "unit",
     "vector",
 ]

@@ -115,4 +115,18 @@ def _step_function(name: str, above: float, at: float, below: float) -> Any:
     return intrinsic(value)
 
 
+def _ceil(typing: Any, x: Any) -> Any:
+    """The next whole number above, as a float."""
+    kind = types.float64 if isinstance(x, types.Number) else x
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        ty = args[0].type
+        name = f"llvm.ceil.v{ty.count}f64" if isinstance(ty, ir.VectorType) else "llvm.ceil.f64"
+        return b.call(cgutils.get_or_insert_function(b.module, ir.FunctionType(ty, [ty]), name), args)
+
+    return kind(kind), lower
+
+
+_ceil.__name__ = "ceil"
 sign, heaviside = _step_function("sign", 1.0, 0.0, -1.0), _step_function("heaviside", 1.0, 0.5, 0.0)
+ceil: Any = intrinsic(_ceil)

@@ -9,7 +9,7 @@ from numba.core import types
 from numba.extending import intrinsic
 
 from piazzi.kernels.lanes.algebra import get, join, parts, scale, widen
-from piazzi.kernels.lanes.kinds import DOUBLE, Matrix, Vector, element, llvm_type
+from piazzi.kernels.lanes.kinds import DOUBLE, Matrix, Vector, element, llvm_type, wider
 
 
 @intrinsic
@@ -162,3 +162,36 @@ def store_lanes(typing: Any, a: Any, at: Any, stride: Any, value: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(a, types.intp, types.intp, value), lower
+
+
+@intrinsic(prefer_literal=True)
+def load_packs(typing: Any, a: Any, at: Any, n: Any, w: Any) -> Any:
+    """The `n` packs of `w` consecutive numbers each from position `at`, as `store_packs` wrote them."""
+    result = Vector(n.literal_value, w.literal_value)
+    register = llvm_type(element(result.w))
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        values = []
+        for i in range(result.n):
+            start = b.add(args[1], ir.Constant(args[1].type, i * result.w))
+            values.append(b.load(_pointer(b, args[0], start, register)))
+            values[-1].align = 8
+        return join(b, result, values)
+
+    return result(a, types.intp, n, w), lower
+
+
+@intrinsic(prefer_literal=True)
+def store_packs(typing: Any, a: Any, at: Any, value: Any, w: Any) -> Any:
+    """Write a vector or matrix in `w` lanes from position `at`, all lanes of an entry before the next entry."""
+    target = wider(value, w.literal_value)
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        whole = widen(b, value, target, args[2])
+        rows = [whole] if isinstance(value, Vector) else parts(b, whole)
+        for i, pack in enumerate(pack for row in rows for pack in parts(b, row)):
+            start = b.add(args[1], ir.Constant(args[1].type, i * w.literal_value))
+            b.store(pack, _pointer(b, args[0], start, pack.type)).align = 8
+        return context.get_dummy_value()
+
+    return types.void(a, types.intp, value, w), lower

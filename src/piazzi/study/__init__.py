@@ -1,0 +1,1 @@
+"""Studies: many runs of many settings, on one machine or a cluster."""

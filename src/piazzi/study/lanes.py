@@ -1,0 +1,241 @@
+"""Many runs of one problem together in vector lanes: simulation, the extended Kalman filter, and what its errors are."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.kernels.spec import machine_lanes
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """What all runs of a simulated study share: epochs, and which station measures in which row.
+
+    Shapes: `times` (K,); `first_row` (K + 1,); `station` (J,), with every station at every epoch.
+    """
+
+    problem: Problem
+    times: Array
+
+    @cached_property
+    def first_row(self) -> Array:
+        return np.arange(len(self.times) + 1, dtype=np.int64) * len(self.problem.stations)
+
+    @cached_property
+    def station(self) -> Array:
+        return np.tile(np.arange(len(self.problem.stations), dtype=np.int64), len(self.times))
+
+    @cached_property
+    def width(self) -> Array:
+        """Components of each station, (S,)."""
+        return np.array([len(s.noise) for s in self.problem.stations], dtype=np.int64)
+
+    @cached_property
+    def angle(self) -> Array:
+        """Marks of components that are angles, (S, M)."""
+        out = np.zeros((len(self.problem.stations), self.problem.model.width), dtype=np.int64)
+        for s, station in enumerate(self.problem.stations):
+            out[s, : self.width[s]] = self.problem.model.sensor(station.sensor).is_angle
+        return out
+
+    @cached_property
+    def root(self) -> Array:
+        """Lower Cholesky factor of R of each station, (S, M, M)."""
+        return np.linalg.cholesky(self.problem.station_noise)
+
+    @cached_property
+    def whitening(self) -> Array:
+        """Inverse of those factors, by forward substitution."""
+        L = self.root
+        out = np.zeros_like(L)
+        for i in range(L.shape[1]):
+            row = -np.einsum("sj,sjk->sk", L[:, i, :i], out[:, :i, :])
+            row[:, i] += 1.0
+            out[:, i, :] = row / L[:, i, i, None]
+        return out
+
+    @cached_property
+    def member(self) -> Array:
+        """Which states each group of states has, (G, n)."""
+        model = self.problem.model
+        groups = model.group_indices or {name: (i,) for i, name in enumerate(model.names)}
+        out = np.zeros((len(groups), model.n), dtype=np.int64)
+        for g, columns in enumerate(groups.values()):
+            out[g, list(columns)] = 1
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """Errors of M runs at every epoch.
+
+    Attributes
+    ----------
+    squared : (M, K, G), squared length of the error in each group of states
+    spread : (M, K, G), the variance that the covariance gives it
+    nees : (M, K)
+    nis : (M, J), of each row of measurements at its prediction
+    lowest : (M,), smallest pivot of a correlation matrix on the way: what is not far above rounding needs another look
+    """
+
+    squared: Array
+    spread: Array
+    nees: Array
+    nis: Array
+    lowest: Array
+
+
+def in_lanes(problem: Problem) -> bool:
+    """Whether runs of this problem can advance together: the same operations in each, and process noise of one shape."""
+    assert problem.integrator is not None
+    return problem.integrator.in_lanes and not problem.noise_varies and not problem.manoeuvres
+
+
+def lane_count() -> int:
+    """Runs that advance together: eight, so that where registers hold four, one waits for its roots while another works."""
+    if os.environ.get("PIAZZI_JIT", "1") == "0":
+        return 1
+    return max(machine_lanes(), 8) if machine_lanes() > 1 else 1
+
+
+def simulate_runs(layout: Layout, actual: Problem, first: Array, w: Array, v: Array, noisy: bool = True) -> tuple[Array, Array]:
+    """True states (M, K, n) and measurements (M, J, m) of M runs, from their first states and unit normal draws.
+
+    Parameters
+    ----------
+    layout : Layout of the problem as the sensors are
+    actual : Problem as it moves
+    first : (M, n), true states at the time of the prior
+    w, v : (M, K, n) and (M, J, m), standard normal
+    noisy : whether the sensors have errors
+    """
+    M, K = w.shape[:2]
+    J, m = v.shape[1:]
+    start, count, scale = actual.intervals(layout.times)
+    lanes = lane_count()
+    first, w, v = _padded(lanes, first, w, v)
+    truth, z = np.empty(w.shape), np.full(v.shape, np.nan)
+    _library(actual, lanes).simulate_lanes(
+        len(w),
+        K,
+        J,
+        layout.times,
+        start,
+        count,
+        scale,
+        layout.first_row,
+        layout.station,
+        actual.station_sensor,
+        layout.width,
+        layout.angle,
+        actual.station_numbers,
+        layout.root if noisy else np.zeros_like(layout.root),
+        actual.given,
+        semidefinite_root(actual.process_noise.covariance),
+        first,
+        w,
+        v,
+        np.ones(1),
+        np.empty(m * lanes),
+        truth,
+        z,
+    )
+    return truth[:M], z[:M]
+
+
+def filter_runs(
+    layout: Layout, z: Array, truth: Array | None = None, *, at_truth: bool = False
+) -> tuple[Array, Array, Scores | None]:
+    """The extended Kalman filter on M runs at once, measurements (M, J, m).
+
+    Returns
+    -------
+    mean, covariance : (M, n) and (M, n, n), at the last epoch
+    scores : Scores, or None without `truth`, (M, K, n)
+
+    With `at_truth`, everything is linearised at the truth and the mean stays there: the covariances are then the Cramer-Rao
+    bound of each run.
+    """
+    problem = layout.problem
+    M, (J, m), K, n = len(z), z.shape[1:], len(layout.times), problem.model.n
+    start, count, scale = problem.intervals(layout.times)
+    lanes, groups = lane_count(), len(layout.member)
+    scored = truth is not None
+    z, states = _padded(lanes, z, np.zeros((M, 0, 0)) if truth is None else truth)
+    runs = len(z)
+    mean, P, lowest = np.empty((runs, n)), np.empty((runs, n, n)), np.empty(runs)
+    squared, spread = np.empty((2, runs, K if scored else 0, groups))
+    nees, nis = np.empty((runs, K if scored else 0)), np.empty((runs, J if scored else 0))
+    _library(problem, lanes).filter_lanes(
+        runs,
+        K,
+        J,
+        layout.times,
+        start,
+        count,
+        scale,
+        layout.first_row,
+        z,
+        layout.station,
+        problem.station_sensor,
+        layout.width,
+        problem.station_numbers,
+        problem.station_noise,
+        layout.whitening,
+        problem.station_correlated,
+        problem.given,
+        problem.process_noise.covariance,
+        np.tile(problem.mean, (runs, 1)),
+        problem.covariance,
+        np.ones(1),
+        int(at_truth),
+        int(scored),
+        states,
+        layout.member,
+        groups,
+        np.empty(m * lanes),
+        np.empty(m * lanes),
+        np.empty(m * n * lanes),
+        np.empty((n * n + 2 * n) * lanes),
+        mean,
+        P,
+        squared,
+        spread,
+        nees,
+        nis,
+        lowest,
+    )
+    scores = Scores(squared[:M], spread[:M], nees[:M], nis[:M], lowest[:M]) if scored else None
+    return mean[:M], P[:M], scores
+
+
+def semidefinite_root(Q: Array) -> Array:
+    """Lower Cholesky factor of a semidefinite matrix: a direction without noise has a zero column."""
+    L = np.array(Q, dtype=float)
+    for j in range(len(L)):
+        pivot = L[j, j] - (L[j, :j] ** 2).sum()
+        root = np.sqrt(pivot) if pivot > 1e-13 * Q[j, j] else 0.0
+        L[j + 1 :, j] = (L[j + 1 :, j] - (L[j + 1 :, :j] * L[j, :j]).sum(axis=1)) / root if root else 0.0
+        L[j, j], L[j, j + 1 :] = root, 0.0
+    return L
+
+
+def _library(problem: Problem, lanes: int) -> SimpleNamespace:
+    fragments = ("transition", "step_lanes", "score_lanes", "simulate_lanes", "filter_lanes")
+    return kernels.load(problem.spec(*fragments, lanes=lanes))
+
+
+def _padded(lanes: int, *arrays: Array) -> tuple[Array, ...]:
+    """Arrays of runs, the last run repeated where there are fewer than lanes."""
+    missing = lanes - len(arrays[0])
+    if missing > 0:
+        arrays = tuple(np.concatenate([a, np.repeat(a[-1:], missing, axis=0)]) for a in arrays)
+    return tuple(np.ascontiguousarray(a) for a in arrays)
