@@ -20,8 +20,9 @@ def linearize_dynamics(a, W, t, count, scale, p, Q, x, f, Phi, Q_all):
             y, R = substep_jacobian(start, h, remember(load_lanes(x, k * N, N, N, LANES)), first_rows(), p)
             for i in range(1, count[k + 1]):
                 y, R = substep_jacobian(start + i * h, h, y, R, p)
-            store_lanes(f, j * N, N, y)
-            store_lanes(Phi, j * N * N, N * N, complete(R))
+            one = 1.0 + 0.0 * h  # in every lane: where nothing depends on the states, y and R have a single lane
+            store_lanes(f, j * N, N, one * y)
+            store_lanes(Phi, j * N * N, N * N, one * complete(R))
             j += LANES
         else:
             y_one, Phi_one = transition(t[k], t[k + 1] - t[k], count[k + 1], load_vector(x, k * N, N), p)
