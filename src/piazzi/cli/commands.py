@@ -10,7 +10,7 @@ import click
 from piazzi import __version__
 from piazzi.cli.options import Group
 
-COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare")
+COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "report")
 
 
 class Commands(Group):
@@ -45,6 +45,7 @@ def piazzi() -> None:
       piazzi demo -o demo                       a first look: tables and pictures
       piazzi estimate tracking.npz              the orbit, and how sure it is
       piazzi compare b612-range --with ekf --with graph
+      piazzi report tracking.npz -o page.html   a page to hand to somebody
       piazzi scenarios list                     what is built in
 
     Exit status: 0 done, 2 bad usage or input, 3 an estimator did not succeed.
