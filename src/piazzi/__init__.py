@@ -20,7 +20,7 @@ if TYPE_CHECKING:
         update,
     )
     from piazzi.estimate.substeps import choose_substeps, step_warning, substep_error
-    from piazzi.evaluate import Comparison, compare
+    from piazzi.evaluate import Comparison, Observability, WindowTrade, compare, observability, windows
     from piazzi.kernels import (
         Discrete,
         DormandPrince,
@@ -60,7 +60,8 @@ _WHERE = {
     "with_gauss_markov": "piazzi.problem",
     **dict.fromkeys(("Estimate", "ExtendedKalmanFilter", "FactorGraph", "LiveFilter", "LiveWindow"), "piazzi.estimate"),
     **dict.fromkeys(("Prediction", "SlidingWindow", "Smoother", "Updated", "predict", "update"), "piazzi.estimate"),
-    **dict.fromkeys(("Comparison", "compare"), "piazzi.evaluate"),
+    **dict.fromkeys(("Comparison", "Observability", "WindowTrade"), "piazzi.evaluate"),
+    **dict.fromkeys(("compare", "observability", "windows"), "piazzi.evaluate"),
     **dict.fromkeys(("choose_substeps", "step_warning", "substep_error"), "piazzi.estimate.substeps"),
     **dict.fromkeys(("kepler_transition", "propagate_kepler"), "piazzi.orbit"),
     "simulate": "piazzi.simulation",
@@ -86,6 +87,7 @@ __all__ = [
     "Manoeuvre",
     "Midpoint",
     "Model",
+    "Observability",
     "Parameter",
     "Prediction",
     "Problem",
@@ -102,16 +104,19 @@ __all__ = [
     "Tracking",
     "Truth",
     "Updated",
+    "WindowTrade",
     "choose_substeps",
     "compare",
     "kepler_transition",
     "load",
+    "observability",
     "predict",
     "propagate_kepler",
     "simulate",
     "step_warning",
     "substep_error",
     "update",
+    "windows",
     "with_gauss_markov",
 ]
 

@@ -10,7 +10,7 @@ import click
 from piazzi import __version__
 from piazzi.cli.options import Group
 
-COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "report")
+COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "windows", "observability")
 
 
 class Commands(Group):
@@ -45,7 +45,8 @@ def piazzi() -> None:
       piazzi demo -o demo                       a first look: tables and pictures
       piazzi estimate tracking.npz              the orbit, and how sure it is
       piazzi compare b612-range --with ekf --with graph
-      piazzi report tracking.npz -o page.html   a page to hand to somebody
+      piazzi windows tracking.npz               how long a window has to be
+      piazzi observability b612-range-q0        what can be seen, and how well
       piazzi scenarios list                     what is built in
 
     Exit status: 0 done, 2 bad usage or input, 3 an estimator did not succeed.

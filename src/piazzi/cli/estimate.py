@@ -85,7 +85,7 @@ def _follow(
 
 def to_dict(comparison: Comparison) -> dict[str, Any]:
     """The comparison's object with units, and in every row the last state with its standard deviations."""
-    from piazzi.evaluate.comparison import finite
+    from piazzi.evaluate.quantities import finite
 
     model, views = comparison.problem.model, comparison.views
     document = comparison.to_dict() | {"schema": SCHEMA, "units": {name: model.unit(name) for name in model.names}}
@@ -116,7 +116,7 @@ def write(path: str, comparison: Comparison, document: dict[str, Any]) -> None:
 
 def series(estimate: Estimate) -> dict[str, Any]:
     """Every time, mean and covariance as lists, numbers that are not finite as None."""
-    from piazzi.evaluate.comparison import finite
+    from piazzi.evaluate.quantities import finite
 
     out: dict[str, Any] = {"view": estimate.view, "times": estimate.times.tolist()}
     out["mean"] = [[finite(v) for v in row] for row in estimate.mean.tolist()]

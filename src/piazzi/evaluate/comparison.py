@@ -6,7 +6,6 @@ import json
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from math import isfinite
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +15,13 @@ from piazzi.estimate import Estimate, Estimator
 from piazzi.estimate.inputs import prepare
 from piazzi.estimate.registry import views_of
 from piazzi.evaluate.display import html, render
+from piazzi.evaluate.grids import as_text
 from piazzi.evaluate.metrics import diverged, groups, known_truth, nis, rmse, squared_in_sigmas
+from piazzi.evaluate.quantities import finite
 from piazzi.problem import Problem, Tracking
 
 if TYPE_CHECKING:
+    import xarray
     from rich.console import Console, ConsoleOptions, RenderResult
 
 LOGGER = logging.getLogger("piazzi.evaluate")
@@ -56,11 +58,6 @@ class Row:
         out |= {f"{g}_rmse_last_half": finite(self.rmse_last_half.get(g)) for g in names}
         out |= {k: finite(getattr(self, k)) for k in ("mean_nees", "mean_nees_last_half", "mean_nis")}
         return out | {"diverged": self.diverged}
-
-
-def finite(value: float | None) -> float | None:
-    """The number, None where it is not finite: JSON has no other."""
-    return float(value) if value is not None and isfinite(value) else None
 
 
 def evaluate(name: str, estimate: Estimate) -> Row:
@@ -129,6 +126,12 @@ class Comparison:
         """The object of schema piazzi.compare/1 as strict JSON."""
         return json.dumps(self.to_dict(), allow_nan=False, indent=indent)
 
+    def to_dataset(self) -> xarray.Dataset:
+        """Every number of the rows, labelled by estimator and view, with units."""
+        from piazzi.evaluate.dataset import comparison_to_dataset
+
+        return comparison_to_dataset(self)
+
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         return render(self, console, options)
 
@@ -136,12 +139,7 @@ class Comparison:
         return html(self)
 
     def __str__(self) -> str:
-        from rich.console import Console
-
-        console = Console(width=200, color_system=None, force_terminal=False)
-        with console.capture() as captured:
-            console.print(self)
-        return captured.get()
+        return as_text(self)
 
 
 def compare(
@@ -178,14 +176,14 @@ def compare(
             found = [evaluate(name, e) for e in (estimate, estimate.delayed) if e is not None]
         except Exception as error:
             LOGGER.debug("%s failed", name, exc_info=True)
-            found = _failed(name, estimator, error)
+            found = failed(name, estimator, error)
         else:
             estimates[name] = estimate
         rows += found
     return Comparison(problem, tracking, tuple(rows), MappingProxyType(estimates), source)
 
 
-def _failed(name: str, estimator: Estimator, error: Exception) -> list[Row]:
+def failed(name: str, estimator: Estimator, error: Exception) -> list[Row]:
     """A row for each view that the estimator would have had."""
     text = " ".join(str(error).split())
     message = text if isinstance(error, ValueError) and text else f"{type(error).__name__}: {text}".rstrip(": ")

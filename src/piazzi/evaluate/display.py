@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, number, printable, sigma_factor, unit_of
+from piazzi.model import Model
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
@@ -36,9 +37,13 @@ class Column:
 
 def group_display(comparison: Comparison, group: str) -> Display:
     """The unit to show the errors of a group of states in, one for all rows."""
-    model = comparison.problem.model
+    return row_display(comparison.problem.model, comparison.rows, group)
+
+
+def row_display(model: Model, rows: Iterable[Row], group: str) -> Display:
+    """The unit to show the errors of a group of a model's states in, one for all these rows."""
     unit = unit_of(model.unit(s) for s in dict(model.groups).get(group, (group,)))
-    return display_of(unit, [v for r in comparison.rows for v in (r.rmse.get(group), r.rmse_last_half.get(group))])
+    return display_of(unit, [v for r in rows for v in (r.rmse.get(group), r.rmse_last_half.get(group))])
 
 
 def columns(comparison: Comparison) -> list[Column]:

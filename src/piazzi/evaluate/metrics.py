@@ -147,6 +147,14 @@ def _pseudo_inverse(y: Array, C: Array) -> tuple[Array, Array]:
     return terms.sum(axis=1), kept.sum(axis=1)
 
 
+def rms_in_sigmas(error: Array, P: Array) -> float:
+    """Root mean e^T P^-1 e per direction, of errors (K, n) and covariances (K, n, n); infinite where it has no value."""
+    found = squared_in_sigmas(error, P, np.ones(error.shape, dtype=bool))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        size = float(np.sqrt(found.value.sum() / found.rank.sum()))
+    return size if np.isfinite(size) else np.inf
+
+
 def has_diverged(estimate: Estimate) -> bool:
     """Whether the estimate has left the truth and does not know it.
 

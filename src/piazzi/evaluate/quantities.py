@@ -81,6 +81,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
+def finite(value: float | None) -> float | None:
+    """The number, None where it is not finite: JSON has no other."""
+    return float(value) if value is not None and isfinite(value) else None
+
+
 def unit_of(units: Iterable[str]) -> str:
     """The unit that all of these are, "" where they differ."""
     found = set(units)

@@ -1,0 +1,91 @@
+"""``piazzi observability``: what the measurements say about the first state."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from piazzi.cli import options, output
+from piazzi.cli.running import DONE
+
+if TYPE_CHECKING:
+    from piazzi.evaluate import Observability
+
+ENDINGS = (".json", ".csv")
+
+
+@click.command(cls=options.Command)
+@options.source
+@click.option("--add", "added", metavar="STATION", multiple=True, help="A station more, repeatable; see the examples.")
+@click.option("--no-twins", is_flag=True, help="Do not look for other first states with the same measurements.")
+@options.output("Write all of it as .json, or the growth over time as .csv; - is JSON on stdout.")
+@options.as_json
+@options.seed
+@options.scenario
+def command(
+    source: str,
+    added: tuple[str, ...],
+    no_twins: bool,
+    output_file: str | None,
+    as_json: bool,
+    seed: int,
+    scenario: str | None,
+) -> int:
+    """Tell what can be known of the first state in SOURCE.
+
+    What the measurements say about it without the prior: singular values of the Fisher information in prior sigmas,
+    Cramer-Rao bounds of every state, the direction seen worst, and other first states that give the same measurements; where
+    the truth is known, whether observability, linearisation or such a twin is what limits estimators.  --add tells what a
+    further station would change: one of the problem's once more, a new one with a sensor of the model and its numbers, or one
+    with an equation of its own; SI units and radians.
+
+    Examples:
+      piazzi observability b612-range-q0
+      piazzi observability b612-range-q0 --add range:mx=-10,my=0,sigma=0.1
+      piazzi observability b612-range-q0 --add "b=atan2(y, x):sigma=0.01,angle"
+      piazzi observability network.toml --add radar --json
+    """
+    output.check_output(output_file, ENDINGS)
+    from piazzi.cli.additions import additions
+    from piazzi.cli.sources import load_source
+    from piazzi.evaluate import observability
+
+    source_found = load_source(source, seed, scenario)
+    problem, tracking = source_found.problem, source_found.tracking
+    add = additions(problem, added)
+    found = observability(problem, tracking, add=add, twins=not no_twins, source=source_found.name)
+    if output_file is not None:
+        write(output_file, found)
+    if as_json:
+        if output_file != output.STDOUT:
+            output.print_json(found.to_dict())
+    elif output_file != output.STDOUT:
+        from piazzi.present.tables import heading
+
+        wrote = [f"Wrote {output_file}"] if output_file else []
+        output.print_rich(heading(problem, tracking, source_found.name), "", found, *wrote)
+    return DONE
+
+
+def write(path: str, found: Observability) -> None:
+    """Write everything as JSON, or the growth over time as CSV."""
+    if path == output.STDOUT or path.lower().endswith(".json"):
+        output.write_json(path, found.to_dict())
+    else:
+        output.write_csv(path, growth_rows(found))
+
+
+def growth_rows(found: Observability) -> list[dict[str, Any]]:
+    """Singular values and Cramer-Rao sigmas after each epoch, one flat record each."""
+    from piazzi.evaluate.quantities import finite
+
+    names = found.problem.model.names
+    return [
+        {"time": t}
+        | {f"singular_value_{i + 1}": v for i, v in enumerate(values)}
+        | {f"{name}_crlb_sigma": finite(s) for name, s in zip(names, sigmas, strict=True)}
+        for t, values, sigmas in zip(
+            found.growth_times.tolist(), found.growth_values.tolist(), found.growth_sigma.tolist(), strict=True
+        )
+    ]

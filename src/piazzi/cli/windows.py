@@ -1,0 +1,99 @@
+"""``piazzi windows``: how long a sliding window has to be."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from piazzi.cli import options, output
+from piazzi.cli.running import DONE, NOT_ESTIMATED
+
+if TYPE_CHECKING:
+    from piazzi.evaluate import WindowTrade
+
+DEFAULT = "1,2,5,10,20,50,100,200"
+ENDINGS = (".json", ".csv")
+_LARGEST = 1_000_000
+_LONG = 50_000  # epochs times states in windows from which a run takes long enough to show a bar
+
+
+def whole_numbers(context: click.Context, parameter: click.Parameter, text: str) -> tuple[int, ...]:
+    """Numbers apart by commas."""
+    try:
+        lags = tuple(int(word) for word in text.split(","))
+    except ValueError:
+        raise click.BadParameter(f"{text!r} is not whole numbers apart by commas, such as {DEFAULT}") from None
+    for lag in lags:
+        if not 1 <= lag <= _LARGEST:
+            raise click.BadParameter(f"{lag} states are no window: from 1 to {_LARGEST}")
+    return lags
+
+
+@click.command(cls=options.Command)
+@options.source
+@click.option(
+    "--lags", metavar="N,N,...", default=DEFAULT, show_default=True, callback=whole_numbers, help="States in each window."
+)
+@click.option(
+    "--iterations",
+    type=click.IntRange(1, 1000),
+    metavar="N",
+    default=1,
+    show_default=True,
+    help="Gauss-Newton steps per epoch.",
+)
+@click.option("--no-graph", is_flag=True, help="Leave out the full graph and its timing.")
+@options.output("Write the rows as .json or .csv; - is JSON on stdout.")
+@options.as_json
+@options.seed
+@options.scenario
+def command(
+    source: str,
+    lags: tuple[int, ...],
+    iterations: int,
+    no_graph: bool,
+    output_file: str | None,
+    as_json: bool,
+    seed: int,
+    scenario: str | None,
+) -> int:
+    """Try sliding windows of several lengths on SOURCE.
+
+    Shows accuracy in real time (the newest state) and delayed (each state as it leaves the window), honesty and microseconds
+    per step against window length, and seconds of the full graph against the number of epochs.
+
+    Examples:
+      piazzi windows tracking.npz
+      piazzi windows b612-range --lags 1,5,20,100 --iterations 3 --json
+      piazzi windows satellite-bearing -o windows.csv
+    """
+    output.check_output(output_file, ENDINGS)
+    from piazzi.cli.sources import load_source
+    from piazzi.evaluate import windows
+    from piazzi.evaluate.window_trade import steps_of
+
+    found = load_source(source, seed, scenario)
+    problem, tracking = found.problem, found.tracking
+    steps = steps_of(lags, tracking, graph=not no_graph)
+    with output.progress(steps, long=len(tracking.times) * sum(lags) > _LONG) as step:
+        trade = windows(problem, tracking, lags, iterations=iterations, graph=not no_graph, source=found.name, announce=step)
+    if output_file is not None:
+        write(output_file, trade)
+    if as_json:
+        if output_file != output.STDOUT:
+            output.print_json(trade.to_dict())
+    elif output_file != output.STDOUT:
+        from piazzi.present.tables import heading
+
+        wrote = [f"Wrote {output_file}"] if output_file else []
+        output.print_rich(heading(problem, tracking, found.name), "", trade, *wrote)
+    return DONE if trade.success else NOT_ESTIMATED
+
+
+def write(path: str, trade: WindowTrade) -> None:
+    """Write a window trade as JSON, or its rows as CSV."""
+    if path == output.STDOUT or path.lower().endswith(".json"):
+        output.write_json(path, trade.to_dict())
+    else:
+        output.write_csv(path, trade.records())

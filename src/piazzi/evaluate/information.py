@@ -1,0 +1,127 @@
+"""What a tracking says about the first state: rows of a square root of its Fisher information, and factors of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.estimate.inputs import Inputs
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+
+_BLOCK = 1 << 14  # rows factored at a time
+# singular values below this share of the largest are rounding errors of the rows
+NEGLIGIBLE = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """A filter that starts from one state for certain.
+
+    Attributes
+    ----------
+    innovations : (J, m), whitened, NaN where missing
+    rows : (J * m, n), minus their derivative by the first state, zero where missing: a root of the Fisher information
+    states : (K, n), those about which measurements were predicted
+    """
+
+    innovations: Array
+    rows: Array
+    states: Array
+
+
+def along(problem: Problem, inputs: Inputs, states: Array) -> Shot:
+    """Linearised about given states (K, n)."""
+    return _observe(problem, inputs, np.array(states, dtype=float), follow=False)
+
+
+def from_first(problem: Problem, inputs: Inputs, first: Array) -> Shot:
+    """Linearised about what the filter makes of the measurements when it starts from this state (n,)."""
+    states = np.empty((inputs.epochs, problem.model.n))
+    states[0] = first
+    return _observe(problem, inputs, states, follow=True)
+
+
+def coast(problem: Problem, inputs: Inputs, first: Array) -> Array:
+    """States (K, n) of the orbit from this first state (n,), without process noise and without measurements."""
+    return from_first(problem, replace(inputs, z=np.full_like(inputs.z, np.nan)), first).states
+
+
+def predicted(problem: Problem, inputs: Inputs, states: Array) -> Array:
+    """Noiseless measurements (J, m) of states (K, n), NaN where a sensor has fewer components."""
+    z = np.empty_like(inputs.z)
+    _library(problem).predict_rows(
+        inputs.epochs,
+        inputs.t,
+        inputs.first_row,
+        inputs.station,
+        problem.station_sensor,
+        problem.station_numbers,
+        problem.given,
+        np.ascontiguousarray(states),
+        z,
+    )
+    return z
+
+
+def _library(problem: Problem) -> SimpleNamespace:
+    return kernels.load(problem.spec("transition", problem.noise_fragment, "decorrelate", "observe"))
+
+
+def _observe(problem: Problem, inputs: Inputs, states: Array, *, follow: bool) -> Shot:
+    N, (J, M) = problem.model.n, inputs.z.shape
+    innovations, rows = np.empty((J, M)), np.empty((J * M, N))
+    _library(problem).observe(
+        inputs.epochs,
+        inputs.t,
+        inputs.count,
+        inputs.scale,
+        *inputs.measured(problem),
+        problem.given,
+        problem.process_noise.covariance,
+        int(follow),
+        states,
+        np.empty(M),
+        np.empty((M, N)),
+        np.empty(M * (M + N)),
+        innovations,
+        rows,
+    )
+    return Shot(innovations, rows, states)
+
+
+def factor(rows: Array, above: Array | None = None) -> Array:
+    """Triangular R (n, n) with R^T R = rows^T rows (+ above^T above), by QR of blocks: nothing is squared."""
+    n = rows.shape[1]
+    R = np.zeros((n, n)) if above is None else above
+    for start in range(0, len(rows), _BLOCK):
+        R = np.asarray(np.linalg.qr(np.vstack([R, rows[start : start + _BLOCK]]), mode="r"))
+    return R
+
+
+def growth(rows: Array, ends: Array) -> Array:
+    """Factors (E, n, n) of the first ends[0], ends[1], ... rows."""
+    out, R, start = np.empty((len(ends), rows.shape[1], rows.shape[1])), None, 0
+    for i, end in enumerate(ends):
+        R = factor(rows[start:end], R)
+        out[i], start = R, end
+    return out
+
+
+def singular(R: Array) -> tuple[Array, Array]:
+    """Singular values (..., n), negligible ones as zero, and their directions (..., n, n), one in each row."""
+    _, values, directions = np.linalg.svd(R)
+    return np.where(values > NEGLIGIBLE * values[..., :1], values, 0.0), directions
+
+
+def bound(values: Array, directions: Array) -> Array:
+    """Cramer-Rao standard deviations (..., n), infinite for what takes part in a direction without information."""
+    blind = values == 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        spread = np.where(blind, 0.0, 1.0 / np.where(blind, 1.0, values))
+    sigma = np.sqrt(np.einsum("...ij,...i->...j", directions**2, spread**2))
+    hidden = (blind[..., :, None] & (np.abs(directions) > 1e-9)).any(axis=-2)
+    return np.where(hidden, np.inf, sigma)

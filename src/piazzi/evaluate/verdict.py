@@ -1,0 +1,108 @@
+"""Observability in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from piazzi.estimate.chi_square import quantile
+from piazzi.evaluate.quantities import display_of, number, printable
+from piazzi.problem.checks import Array
+
+if TYPE_CHECKING:
+    from piazzi.evaluate.observable import Observability
+
+_SHOWN = 0.1  # smallest component of a direction that is worth telling
+_FEEBLE = 1.0  # singular value up to which the measurements tell less than the prior
+_LUCK = 0.999  # share of matched runs, of errors that never change their direction, that stay within what counts as attained
+_CLEARLY = 1.5  # times the other's errors that are worth a verdict
+_FAR = 5.0  # prior sigmas from which a twin is ruled out
+_ALIKE = 3.0  # difference of all measurements together, in sigma, that noise hides
+
+
+def weakest(names: Sequence[str], direction: Array) -> dict[str, float]:
+    """Components of a unit vector by name, largest first, without those that are small."""
+    order = np.argsort(-np.abs(direction), kind="stable")
+    return {names[i]: round(float(direction[i]), 6) for i in order if abs(direction[i]) >= _SHOWN}
+
+
+def verdict(found: Observability) -> str:
+    """What was found and what follows from it, in sentences."""
+    return printable(" ".join([*_local(found), *_twins(found), *_conclusion(found)]))
+
+
+def _local(found: Observability) -> list[str]:
+    values, model = found.singular_values, found.problem.model
+    blind = int((values == 0).sum())
+    direction = " ".join(f"{c:+.2f} {name}" for name, c in found.weakest_direction.items())
+    if blind:
+        unseen = [name for name, s in zip(model.names, found.crlb_sigma.tolist(), strict=True) if not np.isfinite(s)]
+        many = f"{blind} of {model.n} directions of the first state {'is' if blind == 1 else 'are'} not observable"
+        return [f"Observability: {many}: no measurement depends on {direction}, so nothing is known of {', '.join(unseen)}."]
+    sigmas = []
+    for name, s in zip(model.names, found.crlb_sigma.tolist(), strict=True):
+        show = display_of(model.unit(name), [s])
+        sigmas.append(f"{name} {number(s * show.factor, 3)}{show.suffix}")
+    smallest = float(values[-1])
+    how = "to" if smallest > _FEEBLE else "only to"
+    better = np.flatnonzero(found.growth_values[:, -1] > _FEEBLE)
+    since = f" From t = {found.growth_times[better[0]]:g} s on they tell all better than the prior." if better.size else ""
+    noise = "" if found.without_noise is None else "With the process noise assumed, "
+    return [
+        f"Observability: the first state is observable from the measurements alone, condition {number(found.condition, 3)}; "
+        f"the weakest direction ({direction}) is known {how} {number(1 / smallest, 2)} prior sigma.{since}",
+        f"{noise or 'N'}{'n' if noise else ''}o unbiased estimator can do better than sigma {', '.join(sigmas)}.",
+    ]
+
+
+def _twins(found: Observability) -> list[str]:
+    if not found.twins:
+        return ["Twins: none found."]
+    out = []
+    count = int((~np.isnan(found.tracking.values)).sum())
+    for twin in found.twins:
+        state = ", ".join(f"{name} {number(v, 4)}" for name, v in zip(found.problem.model.names, twin.state, strict=True))
+        exact = twin.misfit < 1e-6
+        hidden = twin.misfit * count**0.5 <= _ALIKE
+        what = "exactly the same measurements" if exact else "the same measurements to within their noise" if hidden else (
+            f"nearly the same measurements (RMS difference {number(twin.misfit, 2)} sigma)"
+        )  # fmt: skip
+        place = "" if twin.prior_distance is None else f", {number(twin.prior_distance, 3)} sigma from the prior mean"
+        out.append(f"Twin: {state} gives {what}{place}.")
+    far = [twin.prior_distance is not None and twin.prior_distance > _FAR for twin in found.twins]
+    if all(far):
+        out.append("Only the prior tells the truth from a twin, and it does so clearly.")
+    return out
+
+
+def _conclusion(found: Observability) -> list[str]:
+    """What limits the estimators, where the truth is known."""
+    tried = {a.estimator: a for a in found.attempts}
+    if not {"ekf", "graph"} <= tried.keys():
+        return []
+    ekf, graph, ideal = tried["ekf"], tried["graph"], tried["ekf at the truth"]
+    sizes = f"{_times(ekf.excess)} for the EKF, {_times(graph.excess)} for the factor graph"
+    out = [f"Errors of the last half, from the same prior and measurements, in units of the best that is possible: {sizes}."]
+    stray = [a.estimator for a in (ekf, graph) if a.twin is not None]
+    attained = float(np.sqrt(quantile(_LUCK, found.problem.model.n) / found.problem.model.n))
+    if stray:
+        out.append(f"Verdict: a twin; {' and '.join(stray)} ended on its orbit.")
+    elif (found.singular_values == 0).any():
+        out.append("Verdict: observability; what cannot be seen stays as uncertain as the prior.")
+    elif graph.excess <= attained < ekf.excess and ekf.excess > _CLEARLY * graph.excess:
+        out.append(
+            "Verdict: linearisation. The information is there and the graph gets it; neither lack of observability nor a twin "
+            "is what spoils the EKF, but its Jacobians, taken once and at the wrong place: "
+            f"with Jacobians from the truth the same filter has {_times(ideal.excess)}."
+        )
+    elif max(ekf.excess, graph.excess) <= attained:
+        out.append("Verdict: both attain it; nothing is wrong.")
+    else:
+        out.append("Verdict: no estimator tried attains it, so linearisation or the model, not observability, limits them.")
+    return out
+
+
+def _times(excess: float) -> str:
+    return number(excess, 2) if np.isfinite(excess) else "lost"

@@ -1,0 +1,128 @@
+"""Window lengths: every number is the one that `compare` gives, and the full graph is timed on parts of the run."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi.evaluate.window_trade import head, steps_of, timed_sizes
+
+
+@cache
+def run():
+    problem, tracking = pz.load("b612-range", seed=4)
+    return problem, head(tracking, 60)
+
+
+@cache
+def trade():
+    return pz.windows(*run(), [20, 1, 5, 5], source="here")
+
+
+def test_rows_are_those_of_compare():
+    problem, tracking = run()
+    rows = pz.compare(problem, tracking, {f"window:{n}": pz.SlidingWindow(n) for n in (1, 5, 20)}).rows
+    found = trade()
+    assert found.lags.tolist() == [1, 5, 20]
+    pairs = [row for pair in zip(found.realtime, found.delayed, strict=True) for row in pair]
+    for ours, theirs in zip(pairs, rows, strict=True):
+        assert (ours.estimator, ours.view) == (theirs.estimator, theirs.view)
+        assert ours.rmse == theirs.rmse
+        assert ours.mean_nees_last_half == theirs.mean_nees_last_half
+    assert found.rmse("position").tolist() == [r.rmse_last_half["position"] for r in found.realtime]
+    assert (found.microseconds_per_step > 0).all()
+
+
+def test_the_ends_are_the_filter_and_the_graph():
+    problem, tracking = run()
+    ekf = pz.compare(problem, tracking, {"ekf": pz.ExtendedKalmanFilter()}).rows[0]
+    assert trade().realtime[0].rmse["position"] == pytest.approx(ekf.rmse["position"], rel=1e-9)
+    assert trade().graph.rmse["position"] <= trade().realtime[0].rmse["position"]
+
+
+def test_the_graph_is_timed_from_few_epochs_to_all():
+    timing = trade().timing
+    assert timing.epochs[0] == 10
+    assert timing.epochs[-1] == 60
+    assert (np.diff(timing.epochs) > 0).all()
+    assert (timing.seconds > 0).all()
+    assert timed_sizes(4) == [4]
+
+
+def test_json_is_strict_and_complete():
+    document = json.loads(trade().to_json())
+    assert document["schema"] == "piazzi.windows/1"
+    assert document["lags"] == [1, 5, 20]
+    assert [(r["lag"], r["view"]) for r in document["rows"]][:3] == [(1, "realtime"), (1, "delayed"), (5, "realtime")]
+    assert len(document["timing"]["seconds"]) == len(document["timing"]["epochs"])
+    assert document["graph"]["view"] == "delayed"
+
+
+def test_dataset_has_units_and_both_views():
+    data = trade().to_dataset()
+    assert data["position_rmse"].dims == ("lag", "view")
+    assert data["position_rmse"].sel(lag=5, view="delayed").item() == trade().delayed[1].rmse["position"]
+    assert data["seconds"].attrs["units"] == "s"
+
+
+def test_without_truth_cost_and_nis_stand():
+    problem, tracking = run()
+    found = pz.windows(problem, pz.Tracking(tracking.row_times, tracking.values), [1, 3], graph=False)
+    assert found.groups == ()
+    assert found.graph is None
+    assert found.timing is None
+    assert np.isnan(found.rmse("position")).all()
+    assert found.realtime[0].mean_nis > 0
+    assert "no truth" in str(found)
+    assert found._repr_html_()
+
+
+def test_one_that_fails_leaves_the_others_their_rows(monkeypatch):
+    problem, tracking = run()
+    estimate = pz.SlidingWindow.estimate
+
+    def broken(self, problem, tracking):
+        if self.lag == 3:
+            raise RuntimeError("out of order")
+        return estimate(self, problem, tracking)
+
+    monkeypatch.setattr(pz.SlidingWindow, "estimate", broken)
+    found = pz.windows(problem, tracking, [1, 3, 5], graph=False)
+    assert [r.success for r in found.realtime] == [True, False, True]
+    assert not found.success
+    assert np.isnan(found.microseconds_per_step).tolist() == [False, True, False]
+    assert "out of order" in str(found)
+    assert json.loads(found.to_json())["rows"][2]["microseconds_per_step"] is None
+
+
+def test_one_epoch():
+    problem, tracking = run()
+    one = pz.Tracking(tracking.row_times[:1], tracking.values[:1], truth=tracking.truth[:1])
+    found = pz.windows(problem, one, [1, 200])
+    assert found.success
+    assert found.timing.epochs.tolist() == [1]
+    assert str(found)
+
+
+def test_steps_are_announced():
+    said: list[str] = []
+    problem, tracking = run()
+    pz.windows(problem, tracking, [1, 2], announce=said.append)
+    assert said[:3] == ["window:1", "window:2", "graph"]
+    assert len(said) == steps_of([1, 2], tracking)
+
+
+@pytest.mark.parametrize(("lags", "message"), [([], "no window lengths"), ([0], "lag is 0"), ([1.5], "lag is 1.5")])
+def test_bad_lengths_are_refused(lags, message):
+    with pytest.raises(ValueError, match=message):
+        pz.windows(*run(), lags)
+
+
+def test_head_keeps_rows_truth_and_stations():
+    _, tracking = run()
+    part = head(tracking, 7)
+    assert len(part.times) == 7
+    assert part.truth.shape == (7, 4)
+    assert head(tracking, 60).values.tobytes() == tracking.values.tobytes()
