@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi.estimate.registry import parse
 
 PIAZZI = [str(Path(sys.executable).with_name("piazzi"))]
 FOLLOW = [*PIAZZI, "estimate", "b612-range", "--follow"]
@@ -28,12 +29,13 @@ def measurements():
     return problem, tracking, ["time,range", *lines]
 
 
-def test_the_estimates_are_those_of_the_whole_run(measurements):
+@pytest.mark.parametrize("name", ["ekf", "ukf", "srekf"])
+def test_the_estimates_are_those_of_the_whole_run(measurements, name):
     problem, tracking, lines = measurements
-    done = run("-", text="\n".join(lines) + "\n")
+    done = run("-", "--with", name, text="\n".join(lines) + "\n")
     assert done.returncode == 0
     rows = np.array([[float(v) for v in line.split(",")] for line in done.stdout.splitlines()[1:]])
-    whole = pz.ExtendedKalmanFilter().estimate(problem, tracking)
+    whole = parse(name).estimate(problem, tracking)
     np.testing.assert_array_equal(rows[:, 0], tracking.times)
     np.testing.assert_array_equal(rows[:, 1:5], whole.mean)
     assert "100 measurements taken" in done.stderr
@@ -111,7 +113,7 @@ def test_a_stream_that_goes_on_is_taken_whole(measurements, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("estimator", ["ekf", "window:8"])
+@pytest.mark.parametrize("estimator", ["ekf", "window:8", "ukf"])
 def test_killed_at_random_moments_it_resumes_to_the_same_bytes(measurements, tmp_path, estimator):
     """SIGKILL ten times for each estimator; the measurements trickle in, so that the moments fall all over the run."""
     problem, _, _ = measurements

@@ -12,10 +12,15 @@ def bearings(data_dir):
     return pz.load(data_dir / "satellite" / "slide_example.npz")
 
 
-def test_the_filter_gives_the_whole_run_bit_for_bit(bearings):
+@pytest.mark.parametrize(
+    "estimator",
+    [pz.ExtendedKalmanFilter(), pz.UnscentedKalmanFilter(), pz.SquareRootKalmanFilter()],
+    ids=lambda e: type(e).__name__,
+)
+def test_the_filter_gives_the_whole_run_bit_for_bit(bearings, estimator):
     problem, tracking = bearings
-    whole = pz.ExtendedKalmanFilter().estimate(problem, tracking)
-    live = pz.ExtendedKalmanFilter().start(problem)
+    whole = estimator.estimate(problem, tracking)
+    live = estimator.start(problem)
     for k, t in enumerate(tracking.times):
         live.predict(t)
         live.update(problem.stations[0].name, tracking.values[k, 0])
@@ -46,7 +51,10 @@ def two_radars():
     return problem, pz.simulate(problem, np.cumsum(np.random.default_rng(3).uniform(0.1, 0.4, 30)), np.random.default_rng(4))
 
 
-@pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.SlidingWindow(lag=6)])
+@pytest.mark.parametrize(
+    "estimator",
+    [pz.ExtendedKalmanFilter(), pz.SlidingWindow(lag=6), pz.UnscentedKalmanFilter(), pz.SquareRootKalmanFilter(gate=0.99)],
+)
 def test_several_stations_of_one_epoch_are_one_epoch(two_radars, estimator, monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     problem, tracking = two_radars
@@ -58,7 +66,10 @@ def test_several_stations_of_one_epoch_are_one_epoch(two_radars, estimator, monk
     assert_allclose(live.covariance, whole.covariance[-1], rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.SlidingWindow(lag=6, iterations=2)])
+@pytest.mark.parametrize(
+    "estimator",
+    [pz.ExtendedKalmanFilter(), pz.SlidingWindow(lag=6, iterations=2), pz.UnscentedKalmanFilter(), pz.SquareRootKalmanFilter()],
+)
 def test_a_checkpoint_resumes_to_the_same_bits(two_radars, estimator, monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     problem, tracking = two_radars
@@ -80,6 +91,9 @@ def test_a_checkpoint_of_another_problem_is_refused(two_radars, bearings, monkey
     saved = pz.ExtendedKalmanFilter().start(two_radars[0]).checkpoint()
     with pytest.raises(ValueError, match="has shape"):
         pz.ExtendedKalmanFilter().start(bearings[0]).restore(saved)
+    with pytest.raises(ValueError, match="has shape"):
+        root = pz.UnscentedKalmanFilter().start(two_radars[0]).checkpoint()
+        pz.UnscentedKalmanFilter().start(bearings[0]).restore(root)
     with pytest.raises(ValueError, match="the checkpoint has no"):
         pz.SlidingWindow().start(two_radars[0]).restore(saved)
 
@@ -116,7 +130,7 @@ def test_a_measurement_older_than_the_window_is_refused_by_name(two_radars, monk
 def test_what_cannot_be_taken_is_said(two_radars, monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     problem, _ = two_radars
-    for estimator in (pz.ExtendedKalmanFilter(), pz.SlidingWindow()):
+    for estimator in (pz.ExtendedKalmanFilter(), pz.SlidingWindow(), pz.UnscentedKalmanFilter(), pz.SquareRootKalmanFilter()):
         live = estimator.start(problem)
         with pytest.raises(ValueError, match="time"):
             live.update("east", 3.0)
@@ -131,3 +145,17 @@ def test_what_cannot_be_taken_is_said(two_radars, monkeypatch):
             live.predict(0.5)
         live.update("east", np.nan, 2.0)
         assert np.isfinite(live.mean).all()
+
+
+def test_a_refused_time_leaves_the_epoch_open(two_radars, monkeypatch):
+    """After a measurement that came too late, the next row of the epoch still belongs to it."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem, tracking = two_radars
+    whole = pz.UnscentedKalmanFilter().estimate(problem, tracking)
+    live = pz.UnscentedKalmanFilter().start(problem)
+    for row, (t, name, z) in enumerate(zip(tracking.row_times, tracking.row_stations, tracking.values, strict=True)):
+        if row % 2:
+            with pytest.raises(ValueError, match="is before"):
+                live.predict(t - 0.01)
+        live.update(str(name), z, t)
+    assert_array_equal(live.mean, whole.mean[-1])

@@ -35,7 +35,9 @@ def follow(problem: Problem, estimator: Any, source: str, output: str | None, ch
     stood: a stream that begins as before is skipped to that place, and a file given by -o is cut back to it.
     """
     if not callable(getattr(estimator, "start", None)):
-        raise click.UsageError("--follow needs an estimator that goes forward: ekf or window", click.get_current_context())
+        raise click.UsageError(
+            "--follow needs an estimator that goes forward: ekf, ukf, srekf or window", click.get_current_context()
+        )
     from piazzi.io.checkpoint import fingerprint
 
     with ExitStack() as stack:

@@ -4,9 +4,12 @@ from piazzi.estimate.estimator import Estimate, Estimator
 from piazzi.estimate.factor_graph import FactorGraph
 from piazzi.estimate.kalman import ExtendedKalmanFilter, Prediction, Updated, predict, update
 from piazzi.estimate.live import LiveFilter
+from piazzi.estimate.live_root import LiveRootFilter
 from piazzi.estimate.live_window import LiveWindow
 from piazzi.estimate.sliding_window import SlidingWindow
 from piazzi.estimate.smoother import Smoother
+from piazzi.estimate.square_root import SquareRootKalmanFilter
+from piazzi.estimate.unscented import UnscentedKalmanFilter
 
 __all__ = [
     "Estimate",
@@ -14,10 +17,13 @@ __all__ = [
     "ExtendedKalmanFilter",
     "FactorGraph",
     "LiveFilter",
+    "LiveRootFilter",
     "LiveWindow",
     "Prediction",
     "SlidingWindow",
     "Smoother",
+    "SquareRootKalmanFilter",
+    "UnscentedKalmanFilter",
     "Updated",
     "predict",
     "update",

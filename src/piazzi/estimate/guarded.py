@@ -16,6 +16,12 @@ from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
 
+def check_gate(gate: float | None) -> None:
+    """Raise ValueError for a gate that is no probability."""
+    if gate is not None and not 0 < gate < 1:
+        raise ValueError(f"gate is {gate}; it must be a probability between 0 and 1, such as 0.999")
+
+
 @dataclass(frozen=True)
 class Guard:
     """How an epoch is taken in: so many Gauss-Newton steps, and the share of good measurements that the gate lets through."""

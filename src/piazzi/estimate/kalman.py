@@ -11,7 +11,7 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.estimator import Estimate
-from piazzi.estimate.guarded import Guard, GuardedLiveFilter, guarded_run
+from piazzi.estimate.guarded import Guard, GuardedLiveFilter, check_gate, guarded_run
 from piazzi.estimate.inputs import Inputs, prepare, scratch
 from piazzi.estimate.live import LiveFilter
 from piazzi.estimate.stopwatch import Stopwatch
@@ -60,8 +60,7 @@ class ExtendedKalmanFilter:
             raise ValueError(f"update is {self.update!r}; it must be one of {', '.join(get_args(Update))}")
         if self.iterations != int(self.iterations) or not 1 <= self.iterations <= 1000:
             raise ValueError(f"iterations is {self.iterations}; it must be a whole number from 1 to 1000")
-        if self.gate is not None and not 0 < self.gate < 1:
-            raise ValueError(f"gate is {self.gate}; it must be a probability between 0 and 1, such as 0.999")
+        check_gate(self.gate)
 
     @property
     def guard(self) -> Guard | None:

@@ -45,6 +45,14 @@ def _filter(option: str) -> Mapping[str, Any]:
     return settings
 
 
+def _gated(option: str) -> Mapping[str, Any]:
+    """A gate alone: "gate" or "gate=0.99"."""
+    settings = _filter(option)
+    if "update" in settings:
+        raise ValueError("its only option is gate or gate=P")
+    return settings
+
+
 def _iterated(option: str) -> Mapping[str, Any]:
     """How often, then the options of a filter: ``iekf:3:gate``."""
     first, _, rest = option.partition(":")
@@ -84,6 +92,20 @@ ESTIMATORS: Mapping[str, Entry] = {
         "piazzi.estimate.kalman:ExtendedKalmanFilter",
         ("realtime",),
         _iterated,
+    ),
+    "srekf": Entry(
+        "srekf[:gate[=P]]",
+        "extended Kalman filter in square-root form",
+        "piazzi.estimate.square_root:SquareRootKalmanFilter",
+        ("realtime",),
+        _gated,
+    ),
+    "ukf": Entry(
+        "ukf[:gate[=P]]",
+        "unscented Kalman filter: sigma points instead of Jacobians",
+        "piazzi.estimate.unscented:UnscentedKalmanFilter",
+        ("realtime",),
+        _gated,
     ),
     "smoother": Entry(
         "smoother",

@@ -1,0 +1,123 @@
+"""A filter that carries a root of its covariance, fed one measurement at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from piazzi.estimate.inputs import Inputs
+from piazzi.estimate.live import Clock, checked_measurement
+from piazzi.estimate.root import Root
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+
+
+class LiveRootFilter:
+    """An unscented or square-root filter in progress, from its ``start(problem)``.
+
+    ``predict(t)`` moves to a time, ``update(station, z)`` takes a measurement there; several updates at one time are one epoch,
+    taken at the prediction.  Every call runs the last epoch anew, by the code of the whole run: so the numbers are the same.
+
+    Attributes
+    ----------
+    time : float or None
+        Seconds; None before the first call of a problem without `prior_time`.
+    mean, covariance : (n,), (n, n)
+        The current belief: predicted, or updated.
+    innovation, innovation_covariance : (m,), (m, m), of the last update
+    rejected : whether the gate rejected the last measurement
+    """
+
+    _arrays: ClassVar[tuple[str, ...]] = ("base_mean", "base_root", "root", "mean", "covariance")
+    saved_names: ClassVar[tuple[str, ...]] = (*_arrays, "epoch_values", "epoch_stations", "clock")
+
+    def __init__(self, problem: Problem, root: Root) -> None:
+        self.problem = problem
+        self._kernel, self._clock = root.kernel(problem), Clock(problem)
+        self._stations = {s.name: i for i, s in enumerate(problem.stations)}
+        m = problem.model.width
+        self.mean, self.covariance = problem.mean.copy(), problem.covariance.copy()
+        self.innovation, self.innovation_covariance = np.full(m, np.nan), np.full((m, m), np.nan)
+        self.rejected = False
+        self.base_mean, self.root = problem.mean.copy(), self._kernel.prior_root()
+        self.base_root = self.root.copy()
+        self._row, self._values, self._rows_of = np.full(m, np.nan), np.empty((0, m)), np.empty(0, dtype=np.int64)
+        self.time = problem.prior_time
+
+    def predict(self, t: float) -> None:
+        """Carry the belief to time `t`, from the last epoch that had a measurement; raises ValueError where `t` is earlier."""
+        measured = len(self._values) > 0
+        if measured and t == self.time:
+            return
+        if measured:
+            before, self._clock.time = self._clock.time, self.time
+            try:
+                self._clock.interval(t)
+            except ValueError:
+                self._clock.time = before
+                raise
+            self.base_mean, self.base_root = self.mean, self.root
+            self._values, self._rows_of = self._values[:0], self._rows_of[:0]
+        self._clock.interval(t)
+        self.time = t
+        self._run()
+
+    def update(self, station: str, z: Any, t: float | None = None) -> None:
+        """Take in a measurement of a station, at `t` or where the last prediction stands; NaN where a component is missing.
+
+        Raises
+        ------
+        ValueError
+            For an unknown station, a wrong number of components, an infinite value, or a time that has passed.
+        """
+        s = checked_measurement(self.problem, self._stations, station, z, self._row)
+        if t is not None:
+            self.predict(t)
+        elif self.time is None:
+            raise ValueError(
+                "the time of the first measurement is not known: call predict(t) first, or give the problem a prior_time"
+            )
+        self._values, self._rows_of = np.vstack([self._values, self._row]), np.append(self._rows_of, np.int64(s))
+        nu, S, rejected = self._run()
+        self.innovation, self.innovation_covariance, self.rejected = nu[-1], S[-1], bool(rejected[-1])
+
+    def _run(self) -> tuple[Array, Array, Array]:
+        """The epoch at `time`, with the rows that it has so far, from the belief before it."""
+        assert self.time is not None
+        t = self.time
+        dt = self._clock.interval(t)
+        count, scale = self._clock.step(dt) if dt > 0 else (1, 0.0)
+        before = t if self._clock.time is None else self._clock.time
+        one = np.array([t]), before, np.array([count], dtype=np.int64), np.array([scale])
+        inputs = Inputs(*one, np.array([0, len(self._values)], dtype=np.int64), self._values, self._rows_of)
+        root = self.base_root.copy()
+        mean, P, nu, S, rejected = self._kernel.run(inputs, self.base_mean, root)
+        self.mean, self.covariance, self.root = mean[0], P[0], root
+        return nu, S, rejected
+
+    def checkpoint(self) -> dict[str, Array]:
+        """Everything that the next call depends on, as arrays; `restore` takes it back."""
+        stand = [np.nan if v is None else v for v in (self._clock.time, self.time)]
+        rows = {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
+        return {name: getattr(self, name).copy() for name in self._arrays} | rows | {"clock": np.array(stand)}
+
+    def restore(self, saved: Mapping[str, Array]) -> None:
+        """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
+        m, known = self.problem.model.width, len(self.problem.stations)
+        for name in self.saved_names:
+            if name not in saved:
+                raise ValueError(f"the checkpoint has no {name!r}")
+            wanted = (2,) if name == "clock" else getattr(self, name).shape if name in self._arrays else np.shape(saved[name])
+            if np.shape(saved[name]) != wanted:
+                raise ValueError(f"the checkpoint's {name!r} has shape {np.shape(saved[name])}; this problem needs {wanted}")
+        values, stations = np.asarray(saved["epoch_values"]), np.asarray(saved["epoch_stations"])
+        rows = len(stations) if stations.ndim == 1 else -1
+        if values.shape != (rows, m) or not np.isin(stations, range(known)).all():
+            raise ValueError("the checkpoint's measurements of its epoch do not fit this problem")
+        for name in self._arrays:
+            setattr(self, name, np.array(saved[name], dtype=float))
+        self._values, self._rows_of = np.array(values, dtype=float), stations.astype(np.int64)
+        base, stands = (None if np.isnan(v) else float(v) for v in np.asarray(saved["clock"], dtype=float))
+        self._clock.time, self.time = base, stands

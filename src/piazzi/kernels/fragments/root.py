@@ -1,0 +1,134 @@
+"""Covariances as roots: N rows r_i with P = sum of r_i^T r_i, so that no rounding makes P indefinite.
+
+A state is x = x_pred + sum of u_i r_i with independent u_i of unit variance.  What is measured at one epoch is linear in the
+first N of `unknowns()` such numbers, the u_i, and in the others, which stand for what a measurement's curvature adds.  Their
+joint root B starts as the identity and takes in one component after the other (Potter 1963; Kaminski, Bryson and Schmidt, IEEE
+Trans. Automatic Control 16, 1971), all at the same predicted state: so rows of an epoch commute.
+"""
+
+from piazzi.kernels.fragments.epoch_guarded import surprise
+from piazzi.kernels.fragments.root_linear import sense, unknowns
+from piazzi.kernels.fragments.triangle import keep_root, triangularize_rows
+from piazzi.kernels.vocabulary import *  # noqa: F403
+
+
+@inline
+def begin_epoch(B, d):
+    """Nothing is measured yet: unit variances, and no correction."""
+    for i in range(unknowns()):
+        d[i] = 0.0
+        for j in range(unknowns()):
+            B[i * unknowns() + j] = 1.0 if i == j else 0.0
+
+
+@inline
+def record_root(row, nu, G, R, at, innovation, innovation_covariance):
+    """Write the innovation and S = G G^T + R of one row, NaN where a component is missing."""
+    for i in range(M):
+        innovation[row * M + i] = nu[i]
+        for j in range(M):
+            s = R[at + i * M + j]
+            for k in range(unknowns()):
+                s += G[i * unknowns() + k] * G[j * unknowns() + k]
+            innovation_covariance[(row * M + i) * M + j] = nan if isnan(nu[i]) or isnan(nu[j]) else s
+
+
+@inline
+def whiten_root(nu, G, R, at, L):
+    """Divide innovation and sensitivities of one row by the Cholesky factor of R, in place, without missing components."""
+    for i in range(M):
+        if isnan(nu[i]):
+            for j in range(M):
+                L[i * M + j] = 0.0
+        else:
+            for j in range(i + 1):
+                s = 0.0 if isnan(nu[j]) else R[at + i * M + j]
+                for k in range(j):
+                    s = s - L[i * M + k] * L[j * M + k]
+                if i == j:
+                    L[i * M + i] = sqrt(s)
+                else:
+                    L[i * M + j] = 0.0 if isnan(nu[j]) else s / L[j * M + j]
+            for j in range(i):
+                if not isnan(nu[j]):
+                    nu[i] = nu[i] - L[i * M + j] * nu[j]
+                    for k in range(unknowns()):
+                        G[i * unknowns() + k] -= L[i * M + j] * G[j * unknowns() + k]
+            nu[i] = nu[i] / L[i * M + i]
+            for k in range(unknowns()):
+                G[i * unknowns() + k] = G[i * unknowns() + k] / L[i * M + i]
+
+
+@inline
+def absorb_root(nu, G, at, B, d, phi):
+    """Correction `d` and joint root `B` after one component of unit noise: B' = B - B phi phi^T / (S + sqrt(S))."""
+    S = 1.0
+    e = nu
+    for j in range(unknowns()):
+        e -= G[at + j] * d[j]
+        s = 0.0
+        for i in range(unknowns()):
+            s += B[i * unknowns() + j] * G[at + i]
+        phi[j] = s
+        S += s * s
+    for i in range(unknowns()):
+        s = 0.0
+        for j in range(unknowns()):
+            s += B[i * unknowns() + j] * phi[j]
+        d[i] += s * (e / S)
+        s = s / (S + sqrt(S))
+        for j in range(unknowns()):
+            B[i * unknowns() + j] -= s * phi[j]
+
+
+@inline
+def take_row(
+    row,
+    s,
+    t,
+    x,
+    U,
+    p,
+    z,
+    sensor,
+    numbers,
+    R,
+    nu,
+    H,
+    work,
+    settings,
+    gate,
+    G,
+    B,
+    d,
+    phi,
+    seen,
+    rejected,
+    innovation,
+    innovation_covariance,
+):
+    """One row of measurements into the epoch's correction, unless it lies beyond the gate of its number of components."""
+    sense(s, t, x, U, p, z, row, sensor, numbers, nu, H, G, seen, settings)
+    record_root(row, nu, G, R, s * M * M, innovation, innovation_covariance)
+    squared, present = surprise(row, innovation, innovation_covariance, work)
+    rejected[row] = 1 if squared > gate[present] else 0
+    if rejected[row] == 0:
+        whiten_root(nu, G, R, s * M * M, work)
+        for c in range(M):
+            if not isnan(nu[c]):
+                absorb_root(nu[c], G, c * unknowns(), B, d, phi)
+
+
+@inline
+def finish_epoch(x, U, B, d, rows):
+    """The state with its correction; its root, in place."""
+    for c in range(unknowns()):
+        row = unit(-1, N)
+        for i in range(N):
+            row = row + B[i * unknowns() + c] * load_vector(U, i * N, N)
+        store(rows, c * N, row)
+    for i in range(N):
+        x = x + d[i] * load_vector(U, i * N, N)
+    triangularize_rows(rows, unknowns())
+    keep_root(rows, U)
+    return x
