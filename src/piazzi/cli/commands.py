@@ -10,7 +10,7 @@ import click
 from piazzi import __version__
 from piazzi.cli.options import Group
 
-COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "windows", "observability")
+COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "windows", "observability", "report")
 
 
 class Commands(Group):
@@ -47,6 +47,7 @@ def piazzi() -> None:
       piazzi compare b612-range --with ekf --with graph
       piazzi windows tracking.npz               how long a window has to be
       piazzi observability b612-range-q0        what can be seen, and how well
+      piazzi report tracking.npz -o page.html   a page to hand to somebody
       piazzi scenarios list                     what is built in
 
     Exit status: 0 done, 2 bad usage or input, 3 an estimator did not succeed.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from piazzi.cli import options, output
+from piazzi.cli import options, output, reporting
 from piazzi.cli.running import DONE, NOT_ESTIMATED
 
 if TYPE_CHECKING:
@@ -23,8 +23,15 @@ ENDINGS = (".json", ".csv")
 @options.as_json
 @options.seed
 @options.scenario
+@reporting.option
 def command(
-    source: str, names: tuple[str, ...], output_file: str | None, as_json: bool, seed: int, scenario: str | None
+    source: str,
+    names: tuple[str, ...],
+    output_file: str | None,
+    as_json: bool,
+    seed: int,
+    scenario: str | None,
+    report: str | None,
 ) -> int:
     """Compare several estimators on SOURCE.
 
@@ -36,23 +43,34 @@ def command(
       piazzi compare tracking.npz
       piazzi compare tracking.npz --with ekf --with window:100 --with graph --json
       piazzi compare b612-range-q0 --seed 7
+      piazzi compare tracking.npz --report out
     """
     output.check_output(output_file, ENDINGS)
+    reporting.check(report)
     estimators = options.parsed(names, DEFAULT)
     from piazzi.cli.comparing import run_comparison
 
-    source_name, comparison = run_comparison(source, estimators, seed, scenario)
+    source_name, comparison = run_comparison(source, estimators, seed, scenario, bar=report is not None)
     if output_file is not None:
         write(output_file, comparison)
+    if report is not None:
+        report = write_report(report, comparison, *reporting.titled(source, source_name, scenario))
     if as_json:
         if output_file != output.STDOUT:
             output.print_json(comparison.to_dict())
     elif output_file != output.STDOUT:
         from piazzi.present.tables import heading
 
-        wrote = [f"Wrote {output_file}"] if output_file else []
+        wrote = [f"Wrote {path}" for path in (output_file, report) if path]
         output.print_rich(heading(comparison.problem, comparison.tracking, source_name), "", comparison, *wrote)
     return DONE if comparison.success else NOT_ESTIMATED
+
+
+def write_report(folder: str, comparison: Comparison, title: str, planet_radius: float | None) -> str:
+    """Write the page of a comparison; returns its path."""
+    from piazzi.present.report import comparison_tab
+
+    return str(reporting.write(folder, [comparison_tab(comparison, title=title, planet_radius=planet_radius)]))
 
 
 def write(path: str, comparison: Comparison) -> None:

@@ -15,10 +15,15 @@ if TYPE_CHECKING:
 _LONG = 200_000  # epochs times estimators from which a run takes long enough to show a bar
 
 
-def run_comparison(source: str, estimators: Mapping[str, Estimator], seed: int, scenario: str | None) -> tuple[str, Comparison]:
-    """The source's name and the comparison of these estimators on it; raises as `piazzi.loading` and `piazzi.compare` do."""
+def run_comparison(
+    source: str, estimators: Mapping[str, Estimator], seed: int, scenario: str | None, *, bar: bool = False
+) -> tuple[str, Comparison]:
+    """The source's name and the comparison of these estimators on it; raises as `piazzi.loading` and `piazzi.compare` do.
+
+    A bar of progress is shown for long runs, and where it is asked for.
+    """
     from piazzi.evaluate import compare
 
     found = load_source(source, seed, scenario)
-    with output.progress(len(estimators), long=len(found.tracking.times) * len(estimators) > _LONG) as step:
+    with output.progress(len(estimators), long=bar or len(found.tracking.times) * len(estimators) > _LONG) as step:
         return found.name, compare(found.problem, found.tracking, estimators, source=found.name, announce=step)

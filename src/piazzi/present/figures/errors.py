@@ -13,12 +13,12 @@ from piazzi.evaluate.metrics import errors, groups
 from piazzi.evaluate.quantities import Display, display_of, unit_of
 from piazzi.present.figures.style import (
     MEASURED,
-    colour_of,
     drawn,
     label_of,
     line_of,
     plain,
     plain_ticks,
+    shade_of,
     symmetric_scale,
     time_axis,
 )
@@ -45,7 +45,7 @@ def state_error(ax: Axes, estimate: Estimate, state: str, *, name: str = "estima
     time = time_axis(ax, estimate.times)
     part = drawn(len(band))
     t, half = estimate.times[part] * time.factor, band[part] * show.factor
-    colour = colour_of(name)
+    colour = shade_of(name)
     ax.fill_between(t, -half, half, color=colour, alpha=0.18, lw=0, label="+-3 sigma")
     for sign in (-1, 1):
         ax.plot(t, sign * half, color=colour, lw=0.6, alpha=0.6)

@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.estimate import Estimate
 from piazzi.evaluate.quantities import Display, display_of, unit_of
-from piazzi.present.figures.style import MEASURED, STATIONS, colour_of, drawn, plain, time_axis
+from piazzi.present.figures.style import MEASURED, STATIONS, drawn, plain, shade_of, time_axis
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 
@@ -62,10 +62,10 @@ def innovations(ax: Axes, estimate: Estimate, column: int = 0, *, name: str = "e
     show = display_of(unit, [float(np.median(band)) if len(rows) else 0.0])
     time = time_axis(ax, estimate.times)
     t = estimate.tracking.row_times[rows] * time.factor
-    ax.fill_between(t, -band * show.factor, band * show.factor, color=colour_of(name), alpha=0.15, lw=0, label="3 sigma")
-    ax.plot(t, nu[rows] * show.factor, ".", ms=2.5, color=colour_of(name), label=plain(name))
+    ax.fill_between(t, -band * show.factor, band * show.factor, color=shade_of(name), alpha=0.15, lw=0, label="3 sigma")
+    ax.plot(t, nu[rows] * show.factor, ".", ms=2.5, color=shade_of(name), label=plain(name))
     ax.axhline(0, color=MEASURED, lw=0.7)
-    _limit(ax, t, nu[rows], band, show, colour_of(name))
+    _limit(ax, t, nu[rows], band, show, shade_of(name))
     ax.set_ylabel(show.label(f"innovation of {plain(label)}"))
     return ax
 

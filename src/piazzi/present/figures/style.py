@@ -8,26 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.evaluate.quantities import Display, printable
+from piazzi.present import colours
+from piazzi.present.colours import COLOURS, MEASURED, PLANET, STATIONS, TRUTH, colour_of, dash_of, shade_of, shades
 from piazzi.problem.checks import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito (2008), distinguishable with every kind of colour vision; the same estimator has the same colour everywhere
-COLOURS = {
-    "ekf": "#0072B2",
-    "iekf": "#56B4E9",
-    "ukf": "#CC79A7",
-    "graph": "#D55E00",
-    "window": "#009E73",
-    "smoother": "#E69F00",
-    "batch": "#7A7A7A",
-}
-OTHER = "#7A7A7A"
-TRUTH = "#000000"
-MEASURED = "#555555"
-PLANET = "#C9D3DC"
-STATIONS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+__all__ = ["COLOURS", "MEASURED", "PLANET", "STATIONS", "TRUTH", "colour_of", "label_of", "line_of", "plain", "shade_of"]
 MOST_POINTS = 4000
 RC: Any = {
     "font.size": 9.0,
@@ -45,26 +33,15 @@ RC: Any = {
 }
 
 
-def colour_of(name: str) -> str:
-    """Colour of an estimator by the name it has on the command line; options after the colon do not change it."""
-    return COLOURS.get(name.partition(":")[0], OTHER)
-
-
 def line_of(name: str, view: str, names: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Colour and line style: dashed for what a window says late; paler for the second and later ones of one kind."""
-    from matplotlib.colors import to_rgb
-
-    kind = name.partition(":")[0]
-    same = [n for n in dict.fromkeys(names) if n.partition(":")[0] == kind]
-    pale = 0.6 * same.index(name) / len(same) if name in same else 0.0
-    colour = tuple(c + pale * (1.0 - c) for c in to_rgb(colour_of(name)))
-    dashed = kind == "window" and view == "delayed"
-    return {"color": colour, "linestyle": (0, (4, 1.5)) if dashed else "-"}
+    """Colour and line style of a view of an estimator, among the estimators of these names."""
+    dash = dash_of(name, view, names)
+    return {"color": shades((*names, name))[name], "linestyle": (0, dash) if dash else "-"}
 
 
 def label_of(name: str, view: str) -> str:
     """Name for legends; a window says which of its two views is meant."""
-    return plain(f"{name}, {'delayed' if view == 'delayed' else 'real time'}" if name.partition(":")[0] == "window" else name)
+    return plain(colours.label_of(name, view))
 
 
 def plain(text: str) -> str:

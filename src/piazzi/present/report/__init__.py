@@ -1,0 +1,37 @@
+"""One HTML page that needs nothing else: `page` of tabs of blocks, and the tabs of what Piazzi computes."""
+
+from piazzi.present.report.blocks import (
+    Axis,
+    Chart,
+    Key,
+    Line,
+    Now,
+    Orbit,
+    Point,
+    Section,
+    Tab,
+    Table,
+    Text,
+    Track,
+)
+from piazzi.present.report.comparison import comparison_tab
+from piazzi.present.report.page import page
+from piazzi.present.report.write import write_page
+
+__all__ = [
+    "Axis",
+    "Chart",
+    "Key",
+    "Line",
+    "Now",
+    "Orbit",
+    "Point",
+    "Section",
+    "Tab",
+    "Table",
+    "Text",
+    "Track",
+    "comparison_tab",
+    "page",
+    "write_page",
+]

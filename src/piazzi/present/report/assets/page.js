@@ -1,0 +1,62 @@
+// The page: tabs, light and dark, the tip at the pointer.
+
+const TIP = document.getElementById("tip");
+
+function showTip(event, title, rows) {
+  const lines = rows.map(({ colour, name, value }) => element("div", {}, swatch(colour), element("span", {}, name), element("b", {}, value)));
+  TIP.replaceChildren(element("strong", {}, title), ...lines);
+  TIP.style.display = "block";
+  const [w, h] = [TIP.offsetWidth, TIP.offsetHeight];
+  const x = event.clientX + 16 + w > innerWidth ? event.clientX - w - 12 : event.clientX + 16;
+  const y = Math.min(event.clientY + 12, innerHeight - h - 8);
+  TIP.style.transform = `translate(${Math.max(4, x)}px, ${Math.max(4, y)}px)`;
+}
+
+function hideTip() {
+  TIP.style.display = "none";
+}
+
+function listenToTheme() {
+  const button = document.getElementById("theme");
+  const prefers = matchMedia("(prefers-color-scheme: dark)");
+  const set = (dark) => {
+    document.documentElement.dataset.theme = dark ? "dark" : "light";
+    button.textContent = dark ? "Light" : "Dark";
+    button.setAttribute("aria-pressed", dark);
+    button.setAttribute("aria-label", dark ? "Switch to light colours" : "Switch to dark colours");
+  };
+  set(prefers.matches);
+  prefers.addEventListener("change", () => set(prefers.matches));
+  button.addEventListener("click", () => set(document.documentElement.dataset.theme !== "dark"));
+}
+
+function listenToTabs(tabs) {
+  const buttons = [...document.querySelectorAll("[role=tab]")];
+  const choose = (chosen) => {
+    buttons.forEach((button, i) => {
+      button.setAttribute("aria-selected", i === chosen);
+      button.tabIndex = i === chosen ? 0 : -1;
+      tabs[i].root.classList.toggle("away", i !== chosen);
+      if (i !== chosen) tabs[i].stop();
+    });
+  };
+  buttons.forEach((button, i) => {
+    tabs[i].root.setAttribute("role", "tabpanel");
+    button.addEventListener("click", () => choose(i));
+    button.addEventListener("keydown", (event) => {
+      const move = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!move) return;
+      const next = (i + move + buttons.length) % buttons.length;
+      choose(next);
+      buttons[next].focus();
+    });
+  });
+  if (buttons.length) choose(0);
+}
+
+const TABS = DATA.tabs.map((spec) => new Tab(spec));
+listenToTheme();
+listenToTabs(TABS);
+addEventListener("beforeprint", () => TABS.forEach((tab) => tab.drawAll(400)));
+addEventListener("afterprint", () => TABS.forEach((tab) => tab.drawAll()));
+document.documentElement.dataset.ready = "true";

@@ -1,0 +1,209 @@
+"""Tabs of blocks -> one HTML page that carries all it needs: no network, no other file."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from importlib.resources import files
+from typing import Any
+
+from piazzi.evaluate.quantities import Display, printable
+from piazzi.present.report.blocks import Axis, Block, Chart, Line, Now, Orbit, Section, Tab, Table, Text, Track
+from piazzi.present.report.encode import Pool, script_json
+from piazzi.present.report.pieces import line_mark, summary_point, tab_chooser, table_panel, text
+
+SCRIPTS = ("data.js", "scales.js", "chart.js", "orbit.js", "tab.js", "page.js")
+
+
+def page(title: str, tabs: Sequence[Tab], *, foot: str = "") -> str:
+    """The whole page.  All text is escaped; a policy in the page itself forbids scripts but its own, and all requests.
+
+    Parameters
+    ----------
+    title : of the page
+    tabs : Tab
+    foot : a line at the end
+    """
+    pool = Pool()
+    bodies, data = [], []
+    for number, tab in enumerate(tabs):
+        builder = _Builder(pool, f"t{number}")
+        bodies.append(builder.tab(tab))
+        data.append(builder.data(tab))
+    script = "\n".join(_asset(name) for name in SCRIPTS)
+    digest = b64encode(sha256(f"\n{script}\n".encode()).digest()).decode("ascii")
+    policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
+    chooser = tab_chooser(tabs) if len(tabs) > 1 else ""
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="generator" content="Piazzi">
+<link rel="icon" href="data:,">
+<title>{text(title)}</title>
+<style>
+{_asset("page.css")}
+</style>
+</head>
+<body>
+<header class="top"><div class="wide"><h1>{text(title)}</h1>
+<button type="button" id="theme" class="quiet" aria-pressed="false">Dark</button></div>{chooser}</header>
+<main class="wide">
+<noscript><p class="remark">The charts need JavaScript; the summaries and tables do not.</p></noscript>
+{"".join(bodies)}
+</main>
+<footer class="wide">{text(foot)}</footer>
+<div id="tip" aria-hidden="true"></div>
+<script type="application/json" id="data">{script_json({"pool": pool.entries, "tabs": data})}</script>
+<script>
+{script}
+</script>
+</body>
+</html>
+"""
+
+
+def _asset(name: str) -> str:
+    """The text of a file of the page; the bytes on which the digest is taken are those of the page, so lines end in LF."""
+    return files(__package__).joinpath("assets", name).read_text(encoding="utf-8").replace("\r\n", "\n").strip()
+
+
+class _Builder:
+    """The HTML of one tab, and meanwhile the data that its charts draw."""
+
+    def __init__(self, pool: Pool, name: str) -> None:
+        self.pool, self.name = pool, name
+        self.drawings: list[dict[str, Any]] = []
+
+    def tab(self, tab: Tab) -> str:
+        sections = "".join(self._section(s) for s in tab.sections)
+        points = "".join(map(summary_point, tab.points))
+        return f"""<article class="tab" id="{self.name}" aria-label="{text(tab.title)}">
+<h2>{text(tab.title)}</h2><p class="subtitle">{text(tab.subtitle)}</p>
+<dl class="summary">{points}</dl>
+{self._bar(tab)}
+{sections}
+</article>
+"""
+
+    def data(self, tab: Tab) -> dict[str, Any]:
+        return {
+            "id": self.name,
+            "keys": [{"label": printable(k.label), "colour": k.colour, "dash": list(k.dash)} for k in tab.keys],
+            "times": None if tab.times is None else self.pool.add_exactly(tab.times),
+            "show": _display(tab.show_time),
+            "drawings": self.drawings,
+        }
+
+    def _bar(self, tab: Tab) -> str:
+        """What moves and switches everything on the tab, always in sight."""
+        if not tab.keys:
+            return ""
+        play = slider = ""
+        if tab.times is not None and len(tab.times) > 1:
+            play = '<button type="button" class="play" aria-pressed="false">Play</button>'
+            slider = (
+                f'<input type="range" class="time" min="0" max="{len(tab.times) - 1}" step="1" value="{len(tab.times) - 1}"'
+                ' aria-label="Time"><output class="clock"></output>'
+            )
+        chips = "".join(
+            f'<button type="button" class="chip" data-key="{i}" aria-pressed="true">{line_mark(key)}{text(key.label)}</button>'
+            for i, key in enumerate(tab.keys)
+        )
+        options = "".join(f'<option value="{i}">{text(key.label)}</option>' for i, key in enumerate(tab.keys))
+        focus = f'<label class="focus">Look closely at <select>{options}</select></label>'
+        again = '<button type="button" class="quiet unzoom" hidden>Whole run</button>'
+        return (
+            f'<div class="bar" role="group" aria-label="Time and estimators">'
+            f'<div class="move">{play}{slider}{again}{focus}</div>'
+            f'<div class="chips" role="group" aria-label="Estimators shown">{chips}</div></div>'
+        )
+
+    def _section(self, section: Section) -> str:
+        intro = f'<p class="intro">{text(section.intro)}</p>' if section.intro else ""
+        blocks = "".join(self._block(b) for b in section.blocks)
+        return f'<section><h3>{text(section.title)}</h3>{intro}<div class="grid">{blocks}</div></section>\n'
+
+    def _block(self, block: Block) -> str:
+        match block:
+            case Chart():
+                return self._drawing(block.title, block.note, self._chart(block))
+            case Orbit():
+                return self._drawing(block.title, block.note, self._orbit(block))
+            case Table():
+                return table_panel(block)
+            case Now():
+                return (
+                    f'<div class="panel full"><h4>{text(block.title)}</h4><div class="scroll" tabindex="0" role="region"'
+                    f' aria-label="{text(block.title)}"><table class="now"></table></div></div>'
+                )
+            case Text():
+                return '<div class="panel full">' + "".join(f"<p>{text(p)}</p>" for p in block.paragraphs) + "</div>"
+
+    def _drawing(self, title: str, note: str, drawing: dict[str, Any]) -> str:
+        self.drawings.append(drawing | {"title": printable(title)})
+        remark = f'<p class="remark">{text(note)}</p>' if note else ""
+        return (
+            f'<figure class="panel"><figcaption><h4>{text(title)}</h4></figcaption>'
+            f'<div class="plot" data-drawing="{len(self.drawings) - 1}"></div>{remark}</figure>'
+        )
+
+    def _chart(self, chart: Chart) -> dict[str, Any]:
+        return {
+            "kind": "chart",
+            "time": chart.time,
+            "single": chart.single,
+            "x": _axis(chart.x),
+            "y": _axis(chart.y),
+            "lines": [self._line(line) for line in chart.lines],
+            "levels": [[value, printable(label)] for value, label in chart.levels],
+            "ranges": [[low, high, printable(label)] for low, high, label in chart.ranges],
+            "column": printable(chart.column),
+        }
+
+    def _line(self, line: Line) -> dict[str, Any]:
+        y = self.pool.add_length(line.y) if isinstance(line.y, tuple) else self.pool.add(line.y)
+        return {
+            "key": line.key,
+            "kind": line.kind,
+            "x": self.pool.add_exactly(line.x),
+            "y": y,
+            "times": line.times,
+            "label": printable(line.label),
+            "colour": line.colour,
+            "dash": list(line.dash),
+        }
+
+    def _orbit(self, orbit: Orbit) -> dict[str, Any]:
+        return {
+            "kind": "orbit",
+            "close": orbit.close,
+            "labels": [printable(label) for label in orbit.labels],
+            "show": _display(orbit.show),
+            "limits": list(orbit.limits),
+            "planet": orbit.planet_radius,
+            "tracks": [self._track(track) for track in orbit.tracks],
+        }
+
+    def _track(self, track: Track) -> dict[str, Any]:
+        found = {"x": track.x, "y": track.y, "sx": track.sigma_x, "sy": track.sigma_y, "rho": track.correlation}
+        arrays = {name: None if values is None else self.pool.add(values) for name, values in found.items()}
+        return {"key": track.key, "label": printable(track.label), **arrays}
+
+
+def _display(show: Display) -> list[Any]:
+    return [printable(show.unit), show.factor]
+
+
+def _axis(axis: Axis) -> Mapping[str, Any]:
+    return {
+        "label": printable(axis.label),
+        "show": _display(axis.show),
+        "scale": axis.scale,
+        "low": axis.low,
+        "high": axis.high,
+        "threshold": axis.threshold,
+    }

@@ -1,0 +1,186 @@
+"""Charts of a comparison: errors, innovations, consistency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from piazzi.estimate import Estimate
+from piazzi.estimate.chi_square import quantile
+from piazzi.evaluate.metrics import Consistency, groups, nees, nis
+from piazzi.evaluate.quantities import Display, display_of, number, unit_of
+from piazzi.present.figures.measured import component_of
+from piazzi.present.report.blocks import Axis, Chart, Line
+from piazzi.present.report.thinning import Thinning
+from piazzi.present.report.views import Views
+from piazzi.problem.checks import Array
+
+Shown = Array | tuple[Array, ...]  # what a page is given for a line
+SIGMAS = 3.0
+_STRETCHES = 30  # parts of a run over which NIS is averaged
+_BENT = 30.0  # a scale is logarithmic where values span more than this factor
+
+
+def sigmas_of(estimate: Estimate) -> Array:
+    """Standard deviations, (K, n)."""
+    with np.errstate(invalid="ignore"):
+        out: Array = np.sqrt(np.maximum(np.diagonal(estimate.covariance, axis1=1, axis2=2), 0.0))
+    return out
+
+
+def group_charts(views: Views) -> list[Chart]:
+    """For each group of states the length of the error, and what the covariance expects of it, of every estimator."""
+    first, model = views.estimates[0], views.comparison.problem.model
+    out = []
+    for group, columns in groups(first).items():
+        unit = unit_of(model.unit(model.names[c]) for c in columns)
+        expected = [_expected(views, e, columns) for e in views.estimates]
+        error = [] if views.truth is None else [_length(views, e, columns, views.truth) for e in views.estimates]
+        show = display_of(unit, [_typical(y) for _, y in (*expected, *error)])
+        low, high = _log_limits([y for _, y in (*expected, *error)])
+        y_axis = Axis(f"{group} error", show, "log", low, high)
+        if error:
+            out.append(_overlay(views, f"Error of {group}", y_axis, error, f"{group} error"))
+        y_axis = Axis(f"expected {group} error", show, "log", low, high)
+        title = f"Expected error of {group} (1 sigma)"
+        out.append(_overlay(views, title, y_axis, expected, f"{group} 1 sigma"))
+    return out
+
+
+def _overlay(views: Views, title: str, y: Axis, found: Sequence[tuple[Shown, Array]], column: str) -> Chart:
+    lines = [Line(views.times, shown, key.label, i) for i, (key, (shown, _)) in enumerate(zip(views.keys, found, strict=True))]
+    return Chart(title, views.axis, y, lines, note=views.note(), column=column)
+
+
+def _expected(views: Views, estimate: Estimate, columns: Sequence[int]) -> tuple[Shown, Array]:
+    return _norm(views, sigmas_of(estimate)[:, list(columns)])
+
+
+def _length(views: Views, estimate: Estimate, columns: Sequence[int], truth: Array) -> tuple[Shown, Array]:
+    return _norm(views, (estimate.mean - truth)[:, list(columns)])
+
+
+def _norm(views: Views, parts: Array) -> tuple[Shown, Array]:
+    """What the page gets for the length of vectors (K, g), and the length itself: their parts, where it has them anyway."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        length: Array = np.sqrt((parts**2).sum(axis=1))
+    return (tuple(parts.T) if views.thin.size == 1 else views.thin.extremes(length)), length
+
+
+def _typical(values: Array) -> float:
+    good = values[np.isfinite(values)]
+    return float(np.median(good)) if good.size else 0.0
+
+
+def _log_limits(series: Sequence[Array]) -> tuple[float, float]:
+    """Limits that hold all but the smallest half per cent."""
+    good = np.concatenate([s[np.isfinite(s) & (s > 0)] for s in series]) if series else np.empty(0)
+    if not good.size:
+        return 0.1, 10.0
+    low, high = float(np.quantile(good, 0.005)), float(good.max())
+    return low / 1.3, max(high * 1.3, low * 2)
+
+
+def state_charts(views: Views) -> list[Chart]:
+    """For each state the error within three sigma of the estimator looked at closely."""
+    model, out = views.comparison.problem.model, []
+    for i, state in enumerate(model.names):
+        sizes, lines = [], []
+        for key, estimate in enumerate(views.estimates):
+            sigma = sigmas_of(estimate)[:, i]
+            lines.append(Line(views.times, views.thin.extremes(sigma), "3 sigma", key, "band", SIGMAS))
+            sizes.append(SIGMAS * sigma)
+            if views.truth is not None and not np.isnan(views.truth[:, i]).all():
+                error = estimate.mean[:, i] - views.truth[:, i]
+                lines.append(Line(views.times, views.thin.extremes(error), "error", key))
+                sizes[-1] = np.fmax(sizes[-1], np.abs(error))
+        show = display_of(model.unit(state), [_typical(s) for s in sizes])
+        out.append(Chart(f"Error of {state}", views.axis, _about_zero(f"error of {state}", show, sizes), lines, single=True))
+    return out
+
+
+def _about_zero(label: str, show: Display, sizes: Sequence[Array]) -> Axis:
+    """An axis that holds these sizes on both sides of zero, logarithmic further out where they shrink a lot."""
+    good = [g for g in (s[np.isfinite(s) & (s > 0)] for s in sizes) if g.size]
+    if not good:
+        return Axis(label, show, low=-1.0 / show.factor, high=1.0 / show.factor)
+    largest = max(float(g.max()) for g in good)
+    settled = min(float(np.median(g[len(g) // 2 :])) for g in good)
+    bent = largest > _BENT * settled
+    return Axis(label, show, "symmetric" if bent else "linear", -1.15 * largest, 1.15 * largest, settled if bent else 0.0)
+
+
+def innovations(views: Views) -> list[Chart]:
+    """For each component of the measurements the innovations of the estimator looked at closely, within three sigma."""
+    problem, tracking = views.comparison.problem, views.comparison.tracking
+    thin = Thinning(len(tracking.row_times))
+    times, out = thin.at_places(tracking.row_times), []
+    for column in range(problem.model.width):
+        name, unit = component_of(problem, column)
+        lines, ends = [], []
+        for key, e in enumerate(views.estimates):
+            nu, S = e.innovations[:, column], e.innovation_covariances[:, column, column]
+            band = SIGMAS * np.sqrt(np.where(np.isnan(nu), np.nan, np.maximum(S, 0.0)))
+            lines.append(Line(times, thin.extremes(band), "3 sigma", key, "band"))
+            lines.append(Line(times, thin.extremes(nu), "innovation", key, "points"))
+            good = np.abs(nu[np.isfinite(nu)])
+            ends.append(max(1.6 * _typical(band), 1.15 * float(np.quantile(good, 0.99)) if good.size else 0.0))
+        half = max(ends) or 1.0
+        show = display_of(unit, [half / 1.6])
+        y = Axis(f"innovation of {name}", show, low=-half, high=half)
+        out.append(Chart(f"Innovations of {name}", views.axis, y, lines, single=True, note=views.note(thin)))
+    return out
+
+
+def consistency(views: Views) -> list[Chart]:
+    """NEES of every epoch, and NIS averaged over stretches, each with the range of 95 % of a matched run's values."""
+    n, tracking = views.comparison.problem.model.n, views.comparison.tracking
+    out = []
+    if views.truth is not None:
+        values = [np.where(f.rank > 0, f.value, np.nan) for f in (nees(e) for e in views.estimates) if f is not None]
+        low, high = quantile(0.025, float(n)), quantile(0.975, float(n))
+        out.append(_squares(views, "NEES", f"ideal {n}", values, tracking.times, (float(n), low, high)))
+    stretch = max(1, len(tracking.row_times) // _STRETCHES)
+    means = [running_mean(nis(e), stretch) for e in views.estimates]
+    present = (~np.isnan(tracking.values)).sum(axis=1)
+    expected = float(present[present > 0].mean())
+    freedom = expected * stretch  # innovations of a matched run are independent, so their sum has chi-square's law
+    low, high = (quantile(p, freedom) / stretch for p in (0.025, 0.975))
+    name = "NIS" if stretch == 1 else f"mean NIS of {stretch:,} rows"
+    out.append(_squares(views, name, f"ideal {number(expected, 3)}", means, tracking.row_times, (expected, low, high)))
+    return out
+
+
+def running_mean(found: Consistency, stretch: int) -> Array:
+    """Mean of the known values among the `stretch` rows about each row, (J,); NaN where fewer than half are known."""
+    known = (found.rank > 0) & np.isfinite(found.value)
+    sums = np.concatenate([[0.0], np.cumsum(np.where(known, found.value, 0.0))])
+    counts = np.concatenate([[0], np.cumsum(known)])
+    row = np.arange(len(known))
+    start = np.clip(row - stretch // 2, 0, max(len(known) - stretch, 0))
+    end = np.minimum(start + stretch, len(known))
+    many = counts[end] - counts[start]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(2 * many > stretch, (sums[end] - sums[start]) / many, np.nan)
+
+
+def _squares(
+    views: Views, name: str, ideal: str, values: Sequence[Array], times: Array, law: tuple[float, float, float]
+) -> Chart:
+    """Values against time with their expected mean and range, on a logarithmic scale."""
+    thin = Thinning(len(times))
+    expected, low, high = law
+    bottom, top = _log_limits([*values, np.array([low, high])])
+    shown = thin.at_places(times)
+    lines = [Line(shown, thin.extremes(v), views.keys[i].label, i) for i, v in enumerate(values)]
+    return Chart(
+        f"{name[0].upper()}{name[1:]}, {ideal}",
+        views.axis,
+        Axis(name, Display(""), "log", max(bottom, 1e-2 * low), top),
+        lines,
+        levels=[(expected, "")],
+        ranges=[(low, high, "")],
+        note=f"Grey: 95 % of a matched run's values. {views.note(thin)}".strip(),
+        column=name,
+    )

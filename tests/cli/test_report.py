@@ -1,0 +1,42 @@
+"""``piazzi report`` and ``--report``: the page appears, and bad places are refused before anything is computed."""
+
+import json
+
+
+def test_compare_writes_a_report_beside_its_json(call, tmp_path):
+    found = call("compare", "b612-range", "--with", "ekf", "--json", "--report", tmp_path / "new" / "folder")
+    assert found.status == 0
+    assert found.document["schema"] == "piazzi.compare/1"
+    text = (tmp_path / "new" / "folder" / "report.html").read_text()
+    assert "Probe around B612" in text and "ekf" in text
+
+
+def test_report_puts_several_problems_on_one_page(call, tmp_path):
+    path = tmp_path / "page.html"
+    found = call("report", "b612-range", "b612-range-q0", "--with", "ekf", "--with", "window:20", "-o", path)
+    assert found.status == 0
+    assert found.out == f"Wrote {path}: open it in a browser.\n"
+    text = path.read_text()
+    data = json.loads(text.split('id="data">')[1].split("</script>")[0])
+    assert len(data["tabs"]) == 2
+    assert [key["label"] for key in data["tabs"][0]["keys"]] == ["ekf", "window:20, real time", "window:20, delayed"]
+    (orbit, _) = [d for d in data["tabs"][0]["drawings"] if d["kind"] == "orbit"]
+    assert orbit["planet"] == 10.0
+
+
+def test_a_recording_of_the_founding_layout_has_its_planet(call, tmp_path):
+    recording = tmp_path / "mine.npz"
+    assert call("simulate", "satellite-bearing", "-o", recording).status == 0
+    assert call("report", recording, "--with", "ekf", "-o", tmp_path / "page.html").status == 0
+    assert '"planet":63' in (tmp_path / "page.html").read_text()
+
+
+def test_bad_places_and_sources_are_refused(call, tmp_path):
+    assert "must end in .html" in call("report", "b612-range", "-o", tmp_path / "page.pdf").refused()
+    assert "goes into a file" in call("report", "b612-range", "-o", "-").refused()
+    assert "name a folder" in call("compare", "b612-range", "--report", "-").refused()
+    (tmp_path / "file").write_text("")
+    assert "file" in call("compare", "b612-range", "--report", tmp_path / "file" / "below").refused()
+    assert "b612" in call("report", "b612-rnge", "-o", tmp_path / "page.html").refused()
+    assert "missing argument" in call("report").refused().lower()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file"]

@@ -1,0 +1,262 @@
+"""The report in a browser: what a reader sees, points at, and types."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi.evaluate import Comparison, compare
+from piazzi.evaluate.quantities import number
+from piazzi.present.colours import shade_of
+from piazzi.present.report import comparison_tab, write_page
+from piazzi.scenarios import load_scenario
+
+HOSTILE = "</script><script>hacked=1</script><img src=x onerror=hacked=1>\u2028\u202e&lt;'\"<!--"
+
+
+def made(source: str) -> Comparison:
+    scenario = load_scenario(source)
+    tracking = pz.simulate(scenario.problem, scenario.times, np.random.default_rng(0))
+    estimators = {"ekf": pz.ExtendedKalmanFilter(), "graph": pz.FactorGraph(), "window:20": pz.SlidingWindow(lag=20)}
+    return compare(scenario.problem, tracking, estimators, source=source)
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    return made("b612-range")
+
+
+@pytest.fixture(scope="module")
+def report(comparison, tmp_path_factory) -> Path:
+    """Two problems on one page."""
+    folder = tmp_path_factory.mktemp("report")
+    tabs = [
+        comparison_tab(comparison, title="Probe", planet_radius=10.0),
+        comparison_tab(made("satellite-bearing"), title="Satellite", planet_radius=6.378e6),
+    ]
+    return write_page(folder / "report.html", "Piazzi report", tabs)
+
+
+def visible_lines(page, key: int) -> int:
+    lines = f"#t0 svg .line[data-key='{key}']"
+    return page.evaluate(f"() => [...document.querySelectorAll(`{lines}`)].filter(e => e.style.display !== 'none').length")
+
+
+def test_values_at_the_cursor_are_those_of_the_estimates(open_page, report, comparison):
+    page = open_page(report)
+    slider = page.locator("#t0 input.time")
+    for k in (99, 40):
+        slider.fill(str(k))
+        rows = page.locator("#t0 table.now tbody tr").all()
+        for row, estimate in zip(rows, comparison.views.values(), strict=True):
+            error = estimate.mean[k] - estimate.tracking.truth[k]
+            shown = row.locator("td").first.inner_text()
+            assert float(shown) == pytest.approx(np.hypot(error[0], error[1]), rel=6e-4), (k, shown)
+    assert page.locator("#t0 .clock").inner_text() == f"{number(comparison.tracking.times[40])} s"
+
+
+def test_the_slider_moves_every_cursor_and_the_orbit(open_page, report):
+    page = open_page(report)
+    places = "() => [...document.querySelectorAll('#t0 .cursor')].map(e => Number(e.getAttribute('x1')))"
+    dots = "() => [...document.querySelectorAll('#t0 .dot')].map(e => e.getAttribute('cx') + ' ' + e.getAttribute('cy'))"
+    before, dots_before = page.evaluate(places), page.evaluate(dots)
+    slider = page.locator("#t0 input.time")
+    slider.focus()
+    page.keyboard.press("Home")
+    after, dots_after = page.evaluate(places), page.evaluate(dots)
+    assert len(before) >= 10
+    assert all(a < b for a, b in zip(after, before, strict=True))
+    assert sum(a != b for a, b in zip(dots_after, dots_before, strict=True)) >= len(dots_after) - 1  # one is the truth's own
+    assert slider.get_attribute("aria-valuetext") == "0 s"
+
+
+def test_it_plays_and_pauses(open_page, report):
+    page = open_page(report)
+    button = page.locator("#t0 .play")
+    button.click()
+    assert button.inner_text() == "Pause"
+    page.wait_for_function("() => document.querySelector('#t0 input.time').value > 0")
+    button.click()
+    assert button.inner_text() == "Play"
+    stopped = page.locator("#t0 input.time").input_value()
+    page.wait_for_timeout(100)
+    assert page.locator("#t0 input.time").input_value() == stopped
+
+
+def test_the_legend_switches_an_estimator_everywhere(open_page, report):
+    page = open_page(report)
+    chip = page.locator("#t0 .chip", has_text="graph")
+    shown = visible_lines(page, 1)
+    assert shown >= 5
+    chip.focus()
+    page.keyboard.press("Space")
+    assert chip.get_attribute("aria-pressed") == "false"
+    assert visible_lines(page, 1) == 0
+    assert page.locator("#t0 table.now tr.off").count() == 1
+    chip.click()
+    assert visible_lines(page, 1) == shown
+    page.locator("#t0 .chip", has_text="ekf").click()  # looked at closely: the next one takes its place
+    assert page.locator("#t0 .focus select").input_value() == "1"
+
+
+def test_pointing_shows_values_with_units_and_a_click_moves_the_cursor(open_page, report):
+    page = open_page(report)
+    plot = page.locator("#t0 .plot").nth(2)
+    plot.scroll_into_view_if_needed()
+    plot.hover(position={"x": 300, "y": 100})
+    tip = page.locator("#tip")
+    assert tip.is_visible()
+    text = tip.inner_text()
+    assert " s" in text and " m" in text and "window:20, delayed" in text
+    plot.click(position={"x": 120, "y": 100})
+    assert 0 < int(page.locator("#t0 input.time").input_value()) < 50
+
+
+def test_dragging_shows_a_stretch_of_time_in_every_panel(open_page, report):
+    page = open_page(report)
+    plot = page.locator("#t0 .plot").nth(2)
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    page.mouse.move(box["x"] + 200, box["y"] + 100)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 350, box["y"] + 100, steps=3)
+    page.mouse.up()
+    again = page.locator("#t0 .unzoom")
+    assert again.is_visible()
+    last = "() => [...document.querySelectorAll('#t0 .plot')[3].querySelectorAll('.grid-lines text')].at(-1).textContent"
+    assert float(page.evaluate(last)) < 7
+    again.click()
+    assert float(page.evaluate(last)) > 7
+
+
+def brightness(colour: str) -> float:
+    """Mean channel of rgb(r, g, b), 0 to 1."""
+    return sum(map(int, colour[4:-1].split(","))) / 765
+
+
+def test_light_and_dark(open_page, report):
+    paper = "() => getComputedStyle(document.body).backgroundColor"
+    dark = open_page(report, scheme="dark")
+    night = dark.evaluate(paper)
+    light = open_page(report)
+    day = light.evaluate(paper)
+    assert brightness(night) < 0.15 and brightness(day) > 0.9
+    light.locator("#theme").click()
+    assert light.evaluate(paper) == night
+
+
+def test_tabs_are_reached_with_the_keyboard(open_page, report):
+    page = open_page(report)
+    page.keyboard.press("Tab")
+    page.keyboard.press("Tab")
+    page.keyboard.press("ArrowRight")
+    assert page.locator("#tab-t1").get_attribute("aria-selected") == "true"
+    assert page.locator("#t1").is_visible() and not page.locator("#t0").is_visible()
+    seen = []
+    for _ in range(4):
+        page.keyboard.press("Tab")
+        seen.append(page.evaluate("() => document.activeElement.className || document.activeElement.tagName"))
+    assert seen == ["play", "time", "SELECT", "chip"]
+
+
+OVERLAPS = """() => {
+  const wrong = [];
+  for (const svg of document.querySelectorAll("svg[role=img]")) {
+    const texts = [...svg.querySelectorAll("text")].filter((t) => t.textContent);
+    const boxes = texts.map((t) => [t.textContent, t.getBoundingClientRect()]);
+    const frame = svg.getBoundingClientRect();
+    if (!frame.width) continue;
+    boxes.forEach(([a, p], i) => {
+      if (p.left < frame.left - 1 || p.right > frame.right + 1) wrong.push(`${a} leaves ${svg.getAttribute("aria-label")}`);
+      for (const [b, q] of boxes.slice(i + 1))
+        if (p.left < q.right - 1 && q.left < p.right - 1 && p.top < q.bottom - 3 && q.top < p.bottom - 3)
+          wrong.push(`${a} / ${b}`);
+    });
+  }
+  return wrong;
+}"""
+
+
+@pytest.mark.parametrize("width", [360, 700, 1280])
+def test_no_text_overlaps_and_nothing_scrolls_sideways(open_page, report, width):
+    page = open_page(report, width=width)
+    for tab in ("#tab-t0", "#tab-t1"):
+        page.locator(tab).click()
+        page.wait_for_timeout(100)
+        assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+        assert page.evaluate(OVERLAPS) == []
+
+
+def test_every_axis_of_a_quantity_has_its_unit(open_page, report):
+    page = open_page(report)
+    labels = page.locator("#t1 svg[role=img] text.label").all_text_contents()
+    assert len(labels) >= 24
+    without = {label for label in labels if not label.endswith("]")}
+    assert all("NEES" in label or "NIS" in label for label in without), without
+
+
+def test_printed_it_is_light_and_whole(open_page, report):
+    page = open_page(report, scheme="dark")
+    page.emulate_media(media="print")
+    assert page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert page.locator("#t0").is_visible() and page.locator("#t1").is_visible()
+    assert not page.locator("#t0 .play").is_visible()
+    assert page.evaluate("() => [...document.querySelectorAll('.plot')].every(e => e.querySelector('svg .grid-lines line'))")
+    assert page.pdf()[:4] == b"%PDF"
+
+
+def test_hostile_names_are_text(open_page, comparison, tmp_path):
+    problem = replace(comparison.problem, stations=[replace(comparison.problem.stations[0], name=HOSTILE)])
+    hostile = compare(problem, comparison.tracking, {HOSTILE: pz.ExtendedKalmanFilter()}, source=HOSTILE)
+    path = write_page(tmp_path / "report.html", HOSTILE, [comparison_tab(hostile, title=HOSTILE), comparison_tab(hostile)])
+    page = open_page(path)
+    assert page.evaluate("() => window.hacked") is None
+    assert page.locator("img").count() == 0
+    assert page.locator("script").count() == 2
+    for place in ("h1", "#t0 h2", "#t0 .chip", "#t0 table.now tbody th", "#tab-t0"):
+        assert "</script><script>hacked=1</script><img src=x onerror=hacked=1>" in page.locator(place).first.inner_text()
+
+
+def test_without_truth_panels_say_so(open_page, comparison, tmp_path):
+    blind = replace(comparison.tracking, truth=None)
+    bare = compare(comparison.problem, blind, {"ekf": pz.ExtendedKalmanFilter()})
+    page = open_page(write_page(tmp_path / "report.html", "Report", [comparison_tab(bare)]))
+    text = page.locator("main").inner_text()
+    assert "truth is not known" in text and "NEES needs the truth" in text
+    assert page.locator("#t0 .plot svg").count() >= 8
+
+
+def test_one_epoch_and_a_failed_estimator_make_a_page(open_page, comparison, tmp_path):
+    class Broken:
+        def estimate(self, problem, tracking):
+            raise ValueError("the sky is cloudy")
+
+    short = compare(comparison.problem, pz.Tracking([0.0], [1.0]), {"ekf": pz.ExtendedKalmanFilter(), "odd": Broken()})
+    none = compare(comparison.problem, comparison.tracking, {"odd": Broken()})
+    page = open_page(write_page(tmp_path / "report.html", "Report", [comparison_tab(short), comparison_tab(none)]))
+    assert "odd: the sky is cloudy" in page.locator("#t0 .summary").inner_text()
+    assert page.locator("#t0 .plot svg").count() >= 8
+    page.locator("#tab-t1").click()
+    assert "odd: the sky is cloudy" in page.locator("#t1 .summary").inner_text()
+
+
+def test_lines_pass_through_the_values(open_page, report, comparison):
+    page = open_page(report)
+    ends = page.evaluate(
+        """() => { const chart = TABS[0].drawings.find((d) => d.spec.title === "Error of x");
+        const line = chart.lines.find((l) => l.key === 0 && l.kind === "line");
+        return [Array.from(line.y), Array.from(line.seconds)]; }"""
+    )
+    ekf = comparison.estimates["ekf"]
+    error = ekf.mean[:, 0] - ekf.tracking.truth[:, 0]
+    assert np.allclose(ends[0], error, rtol=2**-16, atol=0)  # what 24 bits hold
+    assert np.allclose(ends[1], comparison.tracking.times, rtol=0, atol=1e-12)
+
+
+def test_every_estimator_has_its_own_look_and_the_colour_of_the_pictures(open_page, report):
+    marks = open_page(report).locator("#t0 .chip svg line").all()
+    looks = [(mark.get_attribute("stroke"), mark.get_attribute("stroke-dasharray")) for mark in marks]
+    assert len(set(looks)) == len(looks) == 4
+    assert [colour for colour, _ in looks] == [shade_of(name) for name in ("ekf", "graph", "window:20", "window:20")]

@@ -1,0 +1,268 @@
+"""Pages without a browser: what they hold, how large they are, and that nothing in them can do harm."""
+
+import json
+import re
+from base64 import b64decode
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import piazzi as pz
+from piazzi.evaluate import Comparison, compare
+from piazzi.present.colours import COLOURS, mixed, shade_of, shades
+from piazzi.present.report import Key, Section, Tab, Table, Text, comparison_tab, page, write_page
+from piazzi.present.report.encode import Pool, packed, script_json
+from piazzi.present.report.panels import running_mean
+from piazzi.present.report.thinning import MOST_POINTS, Thinning
+from piazzi.present.report.words import listed, points
+from piazzi.scenarios import load_scenario
+
+WINDOWS = {f"window:{lag}": pz.SlidingWindow(lag=lag) for lag in (10, 50, 100, 200)}
+SIX = {"ekf": pz.ExtendedKalmanFilter(), "graph": pz.FactorGraph(), **WINDOWS}
+
+
+def unpacked(text: str) -> np.ndarray:
+    """24-bit floats, most significant byte last."""
+    raw = np.frombuffer(b64decode(text), dtype=np.uint8).reshape(-1, 3).astype(np.uint32)
+    return ((raw[:, 0] << 8) | (raw[:, 1] << 16) | (raw[:, 2] << 24)).view(np.float32)
+
+
+def data_of(html: str) -> dict:
+    """The strict JSON that a page holds."""
+
+    def refuse(name: str) -> None:
+        raise AssertionError(f"{name} is not JSON")
+
+    (text,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', html, re.DOTALL)
+    return json.loads(text, parse_constant=refuse)
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    scenario = load_scenario("satellite-bearing")
+    tracking = pz.simulate(scenario.problem, scenario.times, np.random.default_rng(0))
+    return compare(scenario.problem, tracking, SIX, source="satellite-bearing")
+
+
+# ---- numbers -------------------------------------------------------------------------------------------------------------
+
+
+@given(st.lists(st.floats(width=32, allow_nan=True, allow_infinity=True), max_size=20))
+def test_packed_numbers_come_back(values):
+    array = np.array(values, dtype=float)
+    back = unpacked(packed(array))
+    kept = np.isfinite(array) & (np.abs(array) < 1e38) & ((np.abs(array) > 1e-37) | (array == 0))
+    assert_allclose(back[kept], array[kept], rtol=2**-16)
+    assert np.isnan(back[~np.isfinite(array)]).all()
+
+
+def test_an_array_is_kept_once():
+    pool = Pool()
+    x = np.geomspace(1, 1e9, 50)
+    assert pool.add(x) == pool.add(x.copy()) == 0
+    assert pool.add_length((x, -x)) == 2  # its second part is new
+    assert pool.entries[2] == {"length": [0, 1]}
+    times = np.arange(1441) * 15.0
+    assert pool.entries[pool.add_exactly(times)] == [0.0, 15.0, 1441]
+    uneven = np.array([0.0, 1.0, 3.0])
+    assert_allclose(np.frombuffer(b64decode(pool.entries[pool.add_exactly(uneven)]["double"])), uneven)
+
+
+@given(st.text(), st.text())
+def test_json_in_a_page_ends_no_script(key, value):
+    text = script_json({key: [value, "</script><!--\u2028\u2029&"]})
+    assert text.isascii()
+    assert not set(text) & set("<>&")
+    assert json.loads(text) == {key: [value, "</script><!--\u2028\u2029&"]}
+
+
+def test_numbers_that_are_not_finite_are_no_json():
+    with pytest.raises(ValueError, match="JSON"):
+        script_json({"a": float("nan")})
+
+
+# ---- thinning ------------------------------------------------------------------------------------------------------------
+
+
+@given(st.integers(1, 20_000), st.integers(0, 2**32 - 1))
+def test_thinning_keeps_every_spike_and_the_order(count, seed):
+    thin = Thinning(count)
+    values = np.random.default_rng(seed).standard_normal(count)
+    places, shown = thin.places, thin.extremes(values)
+    assert len(places) == len(shown) == len(thin.at_places(values)) <= MOST_POINTS + 1
+    assert (np.diff(places) > 0).all() and places[0] >= 0 and places[-1] < count
+    assert shown.max() == values.max() and shown.min() == values.min()
+    if count <= MOST_POINTS:
+        assert (shown == values).all()
+    else:  # each value stays in its bucket
+        at = {v: i for i, v in enumerate(values)}
+        moved = np.array([at[v] for v in shown]) - places
+        assert np.abs(moved).max() < thin.size
+
+
+def test_thinning_leaves_out_what_is_not_finite():
+    values = np.full(10_000, np.nan)
+    values[5000], values[5001] = 3.0, np.inf
+    shown = Thinning(10_000).extremes(values)
+    assert set(shown[np.isfinite(shown)]) == {3.0}
+
+
+def test_a_million_epochs_make_a_page(comparison):
+    """Estimates repeated to a million epochs: the page stays small, and its spike is there."""
+    ekf = comparison.estimates["ekf"]
+    K, times = 1_000_000, 700
+    mean, truth, P, nu, S, z = (
+        np.concatenate([a] * times)[:K]
+        for a in (
+            ekf.mean,
+            ekf.tracking.truth,
+            ekf.covariance,
+            ekf.innovations,
+            ekf.innovation_covariances,
+            ekf.tracking.values,
+        )
+    )
+    mean[654_321, 2] += 1e7
+    tracking = pz.Tracking(np.arange(K) * 15.0, z, truth=truth)
+    long = replace(ekf, tracking=tracking, mean=mean, covariance=P, innovations=nu, innovation_covariances=S)
+    html = page("Long", [comparison_tab(replace(comparison, tracking=tracking, estimates={"ekf": long}))])
+    assert len(html) < 400_000
+    assert "Of every 1,334 of 1,000,000 values the smallest and the largest are drawn." in html
+    found = data_of(html)
+    (chart,) = [d for d in found["tabs"][0]["drawings"] if d["title"] == "Error of vx"]
+    (line,) = [line for line in chart["lines"] if line["kind"] == "line"]
+    assert unpacked(found["pool"][line["y"]]).max() == pytest.approx(1e7, rel=1e-3)
+
+
+# ---- pages ---------------------------------------------------------------------------------------------------------------
+
+
+def test_two_problems_and_six_estimators_fit(comparison):
+    other = replace(
+        comparison, source="again", estimates={n: replace(e, mean=e.mean * 1.01) for n, e in comparison.estimates.items()}
+    )
+    html = page("Two", [comparison_tab(comparison), comparison_tab(other)])
+    assert len(html.encode()) <= 2_500_000
+    data_of(html)
+
+
+def test_a_page_asks_for_nothing(comparison):
+    html = page("Page", [comparison_tab(comparison)])
+    assert "default-src 'none'" in html
+    assert not re.findall(
+        r"""(?:src|href)=["'](?!data:,)|url\((?!#)|@import|fetch\(|XMLHttp|https?://(?!www\.w3\.org/2000/svg)""", html
+    )
+    tags = re.findall(r"<script[^>]*>", html)
+    assert tags == ['<script type="application/json" id="data">', "<script>"]
+
+
+def test_the_same_comparison_gives_the_same_page(comparison):
+    assert page("Page", [comparison_tab(comparison)]) == page("Page", [comparison_tab(comparison)])
+
+
+def test_a_tab_can_be_anything():
+    """A study: no time, no legend; a table and words."""
+    table = Table([("case", ""), ("error", "m")], [["<b>one</b>", "1.0"]], caption="Cases")
+    html = page(
+        "Study",
+        [Tab("Study", "two cases", [], [Section("Results", [table, Text(["It is <so>."])])], keys=[Key("a", "#123456")])],
+    )
+    assert "&lt;b&gt;one&lt;/b&gt;" in html and "It is &lt;so&gt;." in html
+
+
+def test_pages_are_written_whole_into_a_folder(tmp_path):
+    tab = Tab("T", "", [], [])
+    assert write_page(tmp_path, "T", [tab]).name == "report.html"
+    assert write_page(tmp_path / "mine.html", "T", [tab]) == tmp_path / "mine.html"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.html", "report.html"]
+    with pytest.raises(OSError, match="nowhere"):
+        write_page(tmp_path / "nowhere" / "x.html", "T", [tab])
+
+
+def test_a_lost_estimate_leaves_gaps(comparison):
+    ekf = comparison.estimates["ekf"]
+    mean, P = ekf.mean.copy(), ekf.covariance.copy()
+    mean[700:], P[700:] = np.nan, np.inf
+    lost = replace(ekf, mean=mean, covariance=P)
+    html = page("Lost", [comparison_tab(replace(comparison, estimates={"ekf": lost}))])
+    found = data_of(html)
+    (chart,) = [d for d in found["tabs"][0]["drawings"] if d["title"] == "Error of x"]
+    (line,) = [line for line in chart["lines"] if line["kind"] == "line"]
+    values = unpacked(found["pool"][line["y"]])
+    assert np.isfinite(values[:700]).all() and np.isnan(values[700:]).all()
+
+
+# ---- words ---------------------------------------------------------------------------------------------------------------
+
+
+def said(comparison: Comparison) -> dict[str, str]:
+    return {point.heading: point.text for point in points(comparison)}
+
+
+def with_rows(comparison: Comparison, **changes) -> Comparison:
+    """The first row changed."""
+    first, *rest = comparison.rows
+    return replace(comparison, rows=(replace(first, **changes), *rest))
+
+
+def test_the_best_is_named_with_its_error(comparison):
+    rows = [r for r in comparison.rows if r.view == "realtime"]
+    best = min(rows, key=lambda r: r.rmse_last_half["position"])
+    text = said(comparison)["Best while measuring"]
+    assert text.startswith(best.estimator)
+    assert f"{best.rmse_last_half['position'] / 1e3:.4g}" in text
+
+
+def test_who_is_not_to_be_trusted_is_named_with_the_reason(comparison):
+    assert said(with_rows(comparison, mean_nees_last_half=4 * 9.0))["Too sure of themselves"].startswith(
+        "Errors of ekf are 3.0 times larger"
+    )
+    assert "ekf" in said(with_rows(comparison, diverged=True))["Diverged"]
+    failed = said(with_rows(comparison, success=False, message="the state left the planet"))
+    assert failed["Did not succeed"] == "ekf: the state left the planet."
+    assert "ekf" not in failed["Best while measuring"]
+    cautious = said(with_rows(comparison, mean_nees_last_half=4 / 25))
+    assert "ekf" in cautious["More cautious than needed"]
+
+
+def test_without_truth_the_summary_says_so(comparison):
+    bare = replace(comparison.tracking, truth=None)
+    found = said(compare(comparison.problem, bare, {"ekf": pz.ExtendedKalmanFilter()}))
+    assert "no truth" in found["Errors unknown"]
+    assert found["Covariance holds"].startswith("Innovations of ekf")
+
+
+def test_lists_of_names():
+    assert listed(["a"]) == "a"
+    assert listed(["a", "b", "a"]) == "a and b"
+    assert listed(["w, late", "b", "c"]) == "w, late; b and c"
+
+
+# ---- NIS and colours -----------------------------------------------------------------------------------------------------
+
+
+def test_running_means_of_nis(comparison):
+    from piazzi.evaluate.metrics import nis
+
+    found = nis(comparison.estimates["ekf"])
+    mean = running_mean(found, 48)
+    assert_allclose(mean[500], found.value[500 - 24 : 500 + 24].mean())
+    assert_allclose(mean[0], found.value[:48].mean())
+    assert_allclose(running_mean(found, 1), found.value)
+
+
+def test_an_estimator_has_its_colour_in_any_company():
+    alone = {name: shades([name])[name] for name in ("ekf", "window:10", "window:200", "ekf:gate")}
+    assert {name: shades([*COLOURS, *alone])[name] for name in alone} == alone
+    assert len({shade_of(f"window:{lag}") for lag in (5, 10, 20, 50, 100, 200, 500)}) == 7
+    assert shade_of("window:100x3") == shade_of("window:100") == COLOURS["window"]
+    assert mixed("#000000", 255, 0.5) == "#808080"
+
+
+def test_names_of_the_users_own_differ_from_each_other_and_from_known_ones():
+    found = shades(["mine", "yours", "ekf"])
+    assert len(set(found.values())) == 3
