@@ -95,9 +95,19 @@ def test_demo_writes_what_it_says(call, tmp_path):
     result = call("demo", "-o", tmp_path / "demo")
     assert result.status == 0
     made = sorted(str(p.relative_to(tmp_path / "demo")) for p in (tmp_path / "demo").glob("*/*"))
-    kinds = ["comparison.json", "comparison.png", "errors.png", "measurements.png", "orbit.png", "tracking.csv"]
+    kinds = [
+        "comparison.json",
+        "comparison.png",
+        "consistency.png",
+        "errors.png",
+        "measurements.png",
+        "orbit.png",
+        "tracking.csv",
+    ]
     assert made == [f"{p}/{k}" for p in ("b612-range", "satellite-bearing") for k in kinds]
-    assert "Wrote 12 files" in result.out
+    assert "Wrote 15 files" in result.out
+    assert f"Open {tmp_path / 'demo' / 'report.html'} in a browser" in result.out
+    assert (tmp_path / "demo" / "report.html").read_text().startswith("<!DOCTYPE html>")
     for name in ("b612-range", "satellite-bearing"):
         document = json.loads((tmp_path / "demo" / name / "comparison.json").read_text())
         assert document["schema"] == "piazzi.compare/1"

@@ -10,9 +10,21 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi.evaluate import Comparison, compare
-from piazzi.present.figures import error_overlay, innovations, measurements, orbit, position_at, state_error
+from piazzi.present.figures import (
+    error_overlay,
+    innovations,
+    measurements,
+    nees_track,
+    nis_track,
+    orbit,
+    path_beside_truth,
+    position_at,
+    residuals,
+    state_error,
+)
 from piazzi.present.figures.errors import claim_overlay
 from piazzi.present.figures.pages import pages, save
+from piazzi.present.figures.residuals import residuals_of
 from piazzi.present.figures.style import COLOURS, MOST_POINTS, colour_of, drawn, line_of
 from piazzi.scenarios import load_scenario
 
@@ -155,6 +167,54 @@ def test_missing_measurements_are_left_out(ax, ekf):
     assert len(ax.lines[0].get_xdata()) == 50
 
 
+def test_nees_is_drawn_over_its_range(ax, comparison, ekf):
+    nees_track(ax, comparison)
+    e = ekf.mean[-1] - ekf.tracking.truth[-1]
+    shown = next(line for line in ax.lines if line.get_label() == "ekf").get_ydata()
+    assert_allclose(shown[-1], e @ np.linalg.solve(ekf.covariance[-1], e))
+    (band,) = ax.patches
+    assert_allclose(
+        band.get_extents().transformed(ax.transData.inverted()).intervaly, [0.4844, 11.143], rtol=1e-3
+    )  # chi-square of 4
+    assert ax.get_ylabel() == "NEES (ideal 4)"
+
+
+def test_nees_needs_the_truth(ax, comparison):
+    bare = compare(comparison.problem, replace(comparison.tracking, truth=None), {"ekf": pz.ExtendedKalmanFilter()})
+    with pytest.raises(ValueError, match="needs the truth"):
+        nees_track(ax, bare)
+
+
+def test_nis_is_drawn_as_running_means(ax, comparison, ekf):
+    nis_track(ax, comparison)
+    nis = (ekf.innovations[:, 0] ** 2 / ekf.innovation_covariances[:, 0, 0])[:3].mean()  # three rows: a thirtieth of the run
+    assert_allclose(ax.lines[1].get_ydata()[1], nis)
+    assert ax.get_ylabel() == "mean NIS of 3 rows (ideal 1)"
+
+
+def test_residuals_are_taken_at_the_estimate(ax, ekf):
+    residuals(ax, ekf, name="ekf")
+    x, y = ekf.mean[:, 0], ekf.mean[:, 1]
+    assert_allclose(ax.lines[0].get_ydata(), ekf.tracking.values[:, 0] - np.hypot(x - 10, y), atol=1e-12)
+    assert ax.get_ylabel() == "residual of range [m]"
+
+
+def test_residuals_of_angles_wrap():
+    scenario = load_scenario("satellite-bearing")
+    tracking = pz.simulate(scenario.problem, scenario.times[:50], np.random.default_rng(0))
+    estimate = pz.ExtendedKalmanFilter().estimate(scenario.problem, tracking)
+    turned = replace(tracking, values=tracking.values + 2 * np.pi)
+    left, sigma = residuals_of(replace(estimate, tracking=turned))
+    assert_allclose(left, residuals_of(estimate)[0], atol=1e-12)
+    assert np.abs(left).max() < 4 * sigma.max() == pytest.approx(4 * np.radians(0.2))
+
+
+def test_a_path_beside_the_truth(ax, ekf):
+    path_beside_truth(ax, ekf.mean[:, :2], ekf.tracking.truth[:, :2], name="ekf")
+    assert_allclose(ax.lines[1].get_xydata(), ekf.tracking.truth[:, :2])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "y [m]")
+
+
 # ---- style ---------------------------------------------------------------------------------------------------------------
 
 
@@ -191,7 +251,9 @@ def test_no_picture_draws_more_points_than_it_can_show(count):
 def test_pages_are_saved_whole(comparison, tmp_path):
     for name, figure in pages(comparison, title="Costs $5 and more", planet_radius=10.0):
         assert save(figure, tmp_path / f"{name}.png").stat().st_size > 10_000
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["comparison.png", "errors.png", "measurements.png", "orbit.png"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        f"{name}.png" for name in ("comparison", "consistency", "errors", "measurements", "orbit")
+    ]
 
 
 @pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
@@ -208,7 +270,7 @@ def test_pages_need_no_truth(comparison, tmp_path):
     bare = compare(comparison.problem, tracking, {"ekf": pz.ExtendedKalmanFilter()})
     for name, figure in pages(bare):
         save(figure, tmp_path / f"{name}.png")
-    assert len(list(tmp_path.iterdir())) == 4
+    assert len(list(tmp_path.iterdir())) == 5
 
 
 def test_one_epoch_makes_pictures(comparison, tmp_path):

@@ -16,9 +16,9 @@ from piazzi.evaluate import Comparison, compare
 from piazzi.present.colours import COLOURS, mixed, shade_of, shades
 from piazzi.present.report import Key, Section, Tab, Table, Text, comparison_tab, page, write_page
 from piazzi.present.report.encode import Pool, packed, script_json
-from piazzi.present.report.panels import running_mean
 from piazzi.present.report.thinning import MOST_POINTS, Thinning
 from piazzi.present.report.words import listed, points
+from piazzi.present.squares import running_mean
 from piazzi.scenarios import load_scenario
 
 WINDOWS = {f"window:{lag}": pz.SlidingWindow(lag=lag) for lag in (10, 50, 100, 200)}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from piazzi.cli import options, output
+from piazzi.cli import options, output, reporting
 from piazzi.cli.compare import DEFAULT
 from piazzi.cli.running import DONE, NOT_ESTIMATED
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from piazzi.scenarios import Scenario
 
 PROBLEMS = ("satellite-bearing", "b612-range")
-PICTURES = 4
+PICTURES = 5
 KINDS = ("png", "pdf", "svg")
 
 
@@ -37,19 +37,21 @@ def command(folder: str, kind: str, seed: int) -> int:
     target = Path(folder)
     for name in PROBLEMS:
         _make_folder(target / name)
+    from piazzi.present.report import comparison_tab
     from piazzi.scenarios import load_scenario
 
     wrote: list[Path] = []
-    success = True
+    tabs, success = [], True
     for name in PROBLEMS:
         scenario = load_scenario(name)
         with output.progress(len(DEFAULT) + PICTURES) as step:
             comparison = _estimated(scenario, seed, step)
             wrote += _drawn(comparison, scenario, target / name, kind, step)
         wrote += _kept(comparison, target / name)
+        tabs.append(comparison_tab(comparison, title=scenario.title, planet_radius=scenario.picture.planet_radius))
         success &= comparison.success
         _print(comparison, scenario)
-    _conclude(wrote, target)
+    _conclude([*wrote, reporting.write(str(target), tabs)], target)
     return DONE if success else NOT_ESTIMATED
 
 
@@ -108,11 +110,16 @@ def _print(comparison: Comparison, scenario: Scenario) -> None:
 
 def _conclude(wrote: list[Path], folder: Path) -> None:
     """Say what was written, and what to type next."""
-    lines = [f"Wrote {len(wrote)} files in {folder}:"]
+    lines = [f"Wrote {len(wrote)} files in {folder}:", f"  {folder}: {wrote[-1].name}"]
     for name in PROBLEMS:
         lines.append(f"  {folder / name}: " + ", ".join(path.name for path in wrote if path.parent == folder / name))
     kept = folder / PROBLEMS[1] / "tracking.csv"
-    lines += ["", "Next:"]
+    lines += [
+        "",
+        f"Open {folder / 'report.html'} in a browser: both problems on one page, to point at and to play.",
+        "",
+        "Next:",
+    ]
     for typed, why in (
         ("piazzi compare b612-range-q0", "the same probe, by filters that trust its dynamics entirely"),
         (f"piazzi estimate {kept} --scenario {PROBLEMS[1]}", "the last state in numbers"),

@@ -65,12 +65,12 @@ def innovations(ax: Axes, estimate: Estimate, column: int = 0, *, name: str = "e
     ax.fill_between(t, -band * show.factor, band * show.factor, color=shade_of(name), alpha=0.15, lw=0, label="3 sigma")
     ax.plot(t, nu[rows] * show.factor, ".", ms=2.5, color=shade_of(name), label=plain(name))
     ax.axhline(0, color=MEASURED, lw=0.7)
-    _limit(ax, t, nu[rows], band, show, shade_of(name))
+    limit(ax, t, nu[rows], band, show, shade_of(name))
     ax.set_ylabel(show.label(f"innovation of {plain(label)}"))
     return ax
 
 
-def _limit(ax: Axes, t: Array, nu: Array, band: Array, show: Display, colour: str) -> None:
+def limit(ax: Axes, t: Array, nu: Array, band: Array, show: Display, colour: str) -> None:
     """Limits by the band once settled and by nearly all innovations; those few beyond become arrows at the edge."""
     if not len(nu):
         return

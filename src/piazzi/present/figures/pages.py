@@ -11,6 +11,7 @@ from piazzi.estimate import Estimate
 from piazzi.evaluate.comparison import Comparison
 from piazzi.evaluate.metrics import errors, groups
 from piazzi.io.atomic import atomic_path
+from piazzi.present.figures.consistency import nees_track, nis_track
 from piazzi.present.figures.errors import claim_overlay, error_overlay, size_of, state_display, state_error
 from piazzi.present.figures.measured import innovations, measurements
 from piazzi.present.figures.space import orbit, position_at, position_columns
@@ -37,6 +38,7 @@ def pages(comparison: Comparison, *, title: str = "", planet_radius: float | Non
             ("measurements", lambda: measurement_page(comparison)),
             ("errors", lambda: error_page(comparison)),
             ("comparison", lambda: overlay_page(comparison)),
+            ("consistency", lambda: consistency_page(comparison)),
         ]
     for name, make in makers:
         with rc_context(RC):
@@ -146,6 +148,21 @@ def overlay_page(comparison: Comparison) -> Figure:
     axes[0, -1].set_title("Error that the covariance expects (1 sigma)")
     figure.align_ylabels(list(axes[:, 0]))
     figure.legend(*axes[0, -1].get_legend_handles_labels(), loc="outside lower center", ncols=5)
+    return figure
+
+
+def consistency_page(comparison: Comparison) -> Figure:
+    """NEES, where the truth is known, above NIS."""
+    known = errors(next(iter(comparison.estimates.values()))) is not None
+    figure = _figure(10.5, 2.7 * (1 + known) + 0.7)
+    axes = figure.subplots(1 + known, 1, squeeze=False, sharex=True)[:, 0]
+    if known:
+        nees_track(axes[0], comparison).label_outer()
+        axes[0].set_title("Squared errors in units of their covariance")
+    nis_track(axes[-1], comparison)
+    axes[-1].set_title("Squared innovations in units of their covariance")
+    figure.align_ylabels(list(axes))
+    figure.legend(*axes[-1].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from piazzi.estimate import Estimate
 from piazzi.evaluate.metrics import known_truth
 from piazzi.evaluate.quantities import Display, display_of, unit_of
-from piazzi.present.figures.style import PLANET, TRUTH, drawn, label_of, line_of, plain
+from piazzi.present.figures.style import PLANET, TRUTH, drawn, label_of, line_of, plain, shade_of
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
@@ -59,6 +59,19 @@ def orbit(
         ax.add_patch(patch)
     _frame(ax, extent, drawn_ellipses)
     return _labelled(ax, estimate.problem, (i, j), show)
+
+
+def path_beside_truth(ax: Axes, path: Array, truth: Array, *, name: str = "estimate", unit: str = "m") -> Axes:
+    """A path (K, 2) and the true one in the plane, of whatever origin: the founding paper's two figures of accuracy."""
+    show = display_of(unit, [float(np.nanmax(np.abs(truth), initial=0.0))])
+    part = drawn(len(path))
+    ax.plot(*(path[part].T * show.factor), color=shade_of(name), lw=1.4, label=f"estimate, {plain(name)}")
+    ax.plot(*(truth[part].T * show.factor), color=TRUTH, ls="--", lw=1.2, label="truth")
+    extent = _extent(np.concatenate([path, truth]), None) * show.factor
+    _frame(ax, extent, [])
+    ax.set_xlabel(show.label("x"))
+    ax.set_ylabel(show.label("y"))
+    return ax
 
 
 def position_at(ax: Axes, estimates: Mapping[tuple[str, str], Estimate], k: int = -1) -> Axes:

@@ -7,18 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from piazzi.estimate import Estimate
-from piazzi.estimate.chi_square import quantile
-from piazzi.evaluate.metrics import Consistency, groups, nees, nis
-from piazzi.evaluate.quantities import Display, display_of, number, unit_of
+from piazzi.evaluate.metrics import groups
+from piazzi.evaluate.quantities import Display, display_of, unit_of
 from piazzi.present.figures.measured import component_of
 from piazzi.present.report.blocks import Axis, Chart, Line
 from piazzi.present.report.thinning import Thinning
 from piazzi.present.report.views import Views
+from piazzi.present.squares import Squares, nees_of, nis_of
 from piazzi.problem.checks import Array
 
 Shown = Array | tuple[Array, ...]  # what a page is given for a line
 SIGMAS = 3.0
-_STRETCHES = 30  # parts of a run over which NIS is averaged
 _BENT = 30.0  # a scale is logarithmic where values span more than this factor
 
 
@@ -135,52 +134,23 @@ def innovations(views: Views) -> list[Chart]:
 
 def consistency(views: Views) -> list[Chart]:
     """NEES of every epoch, and NIS averaged over stretches, each with the range of 95 % of a matched run's values."""
-    n, tracking = views.comparison.problem.model.n, views.comparison.tracking
-    out = []
-    if views.truth is not None:
-        values = [np.where(f.rank > 0, f.value, np.nan) for f in (nees(e) for e in views.estimates) if f is not None]
-        low, high = quantile(0.025, float(n)), quantile(0.975, float(n))
-        out.append(_squares(views, "NEES", f"ideal {n}", values, tracking.times, (float(n), low, high)))
-    stretch = max(1, len(tracking.row_times) // _STRETCHES)
-    means = [running_mean(nis(e), stretch) for e in views.estimates]
-    present = (~np.isnan(tracking.values)).sum(axis=1)
-    expected = float(present[present > 0].mean())
-    freedom = expected * stretch  # innovations of a matched run are independent, so their sum has chi-square's law
-    low, high = (quantile(p, freedom) / stretch for p in (0.025, 0.975))
-    name = "NIS" if stretch == 1 else f"mean NIS of {stretch:,} rows"
-    out.append(_squares(views, name, f"ideal {number(expected, 3)}", means, tracking.row_times, (expected, low, high)))
-    return out
+    found = (nees_of(views.comparison) if views.truth is not None else None, nis_of(views.comparison))
+    return [_squares(views, squares) for squares in found if squares is not None]
 
 
-def running_mean(found: Consistency, stretch: int) -> Array:
-    """Mean of the known values among the `stretch` rows about each row, (J,); NaN where fewer than half are known."""
-    known = (found.rank > 0) & np.isfinite(found.value)
-    sums = np.concatenate([[0.0], np.cumsum(np.where(known, found.value, 0.0))])
-    counts = np.concatenate([[0], np.cumsum(known)])
-    row = np.arange(len(known))
-    start = np.clip(row - stretch // 2, 0, max(len(known) - stretch, 0))
-    end = np.minimum(start + stretch, len(known))
-    many = counts[end] - counts[start]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(2 * many > stretch, (sums[end] - sums[start]) / many, np.nan)
-
-
-def _squares(
-    views: Views, name: str, ideal: str, values: Sequence[Array], times: Array, law: tuple[float, float, float]
-) -> Chart:
+def _squares(views: Views, found: Squares) -> Chart:
     """Values against time with their expected mean and range, on a logarithmic scale."""
-    thin = Thinning(len(times))
-    expected, low, high = law
-    bottom, top = _log_limits([*values, np.array([low, high])])
-    shown = thin.at_places(times)
-    lines = [Line(shown, thin.extremes(v), views.keys[i].label, i) for i, v in enumerate(values)]
+    thin = Thinning(len(found.times))
+    bottom, top = _log_limits([*found.values, np.array([found.low, found.high])])
+    shown = thin.at_places(found.times)
+    lines = [Line(shown, thin.extremes(v), views.keys[i].label, i) for i, v in enumerate(found.values)]
     return Chart(
-        f"{name[0].upper()}{name[1:]}, {ideal}",
+        f"{found.name[0].upper()}{found.name[1:]}, {found.ideal}",
         views.axis,
-        Axis(name, Display(""), "log", max(bottom, 1e-2 * low), top),
+        Axis(found.name, Display(""), "log", max(bottom, 1e-2 * found.low), top),
         lines,
-        levels=[(expected, "")],
-        ranges=[(low, high, "")],
+        levels=[(found.expected, "")],
+        ranges=[(found.low, found.high, "")],
         note=f"Grey: 95 % of a matched run's values. {views.note(thin)}".strip(),
-        column=name,
+        column=found.name,
     )
