@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from piazzi.estimate import (
+        Bank,
+        Cauchy,
         Estimate,
         ExtendedKalmanFilter,
         FactorGraph,
+        Huber,
         LiveFilter,
         LiveRootFilter,
         LiveWindow,
@@ -17,6 +20,7 @@ if TYPE_CHECKING:
         SlidingWindow,
         Smoother,
         SquareRootKalmanFilter,
+        Tukey,
         UnscentedKalmanFilter,
         Updated,
         predict,
@@ -66,6 +70,7 @@ _WHERE = {
     **dict.fromkeys(("LiveRootFilter", "SquareRootKalmanFilter", "UnscentedKalmanFilter"), "piazzi.estimate"),
     **dict.fromkeys(("Comparison", "Observability", "WindowTrade"), "piazzi.evaluate"),
     **dict.fromkeys(("compare", "observability", "windows"), "piazzi.evaluate"),
+    **dict.fromkeys(("Bank", "Cauchy", "Huber", "Tukey"), "piazzi.estimate"),
     **dict.fromkeys(("choose_substeps", "step_warning", "substep_error"), "piazzi.estimate.substeps"),
     **dict.fromkeys(("kepler_transition", "propagate_kepler"), "piazzi.orbit"),
     "simulate": "piazzi.simulation",
@@ -74,6 +79,8 @@ _WHERE = {
 
 __version__ = "0.1.0"
 __all__ = [
+    "Bank",
+    "Cauchy",
     "Comparison",
     "Discrete",
     "DormandPrince",
@@ -84,6 +91,7 @@ __all__ = [
     "FactorGraph",
     "Gaussian",
     "Heun",
+    "Huber",
     "Integrator",
     "Kepler",
     "LiveFilter",
@@ -109,6 +117,7 @@ __all__ = [
     "Taylor",
     "Tracking",
     "Truth",
+    "Tukey",
     "UnscentedKalmanFilter",
     "Updated",
     "WindowTrade",

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from piazzi.estimate.bank import Bank, search
 from piazzi.estimate.chain import Chain, CovarianceSolver, InformationSolver, Solver
 from piazzi.estimate.estimator import Estimate
-from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome, optimize
+from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome
 from piazzi.estimate.inputs import Inputs, prepare, with_prior_node
 from piazzi.estimate.kalman import filter_run
+from piazzi.estimate.losses import Cauchy, loss_of
+from piazzi.estimate.robust import RobustChain, chain_for, descend, gated_run
 from piazzi.estimate.sliding_window import SlidingWindow
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
 
-STARTS = ("ekf", "prior", "window")
+STARTS = ("ekf", "prior", "window", "bank")
 SOLVERS = ("auto", "chain", "information")
 # predicted over noise variance of one measurement beyond which a covariance keeps less than six digits of what is left
 DIFFUSE = 1e10
@@ -32,9 +36,11 @@ class FactorGraph:
 
     Parameters
     ----------
-    start : "ekf", "prior", "window", or states (K, n)
-        Where the iterations begin.
+    start : "ekf", "prior", "window", "bank", a `Bank`, or states (K, n)
+        Where the iterations begin.  A bank begins in many places of the prior too, and takes the most probable of the
+        solutions that it finds; see `Bank`.
     max_iterations : int
+        From each start; with a loss four times as many, because reweighting converges linearly.
     tolerance : float
         Converged when no state moves by more than this many of its standard deviations.
     cross_covariances : bool
@@ -49,6 +55,11 @@ class FactorGraph:
     zero.  Steps that raise the cost are damped (Levenberg-Marquardt, scaled by the prior covariance), except the first, whose
     cost says nothing: a start that leaves the dynamics has any cost at all.  With singular noise "cost" uses the
     pseudo-inverse of Q and stands beside "defect", the largest violation of the dynamics in prior standard deviations.
+
+    With a loss the cost is the robust one, found by iterated reweighting; the start is a filter with a gate, and where the
+    solution then disowns many measurements, a window with a loss and the prior are tried too.  Tukey's and Cauchy's losses are
+    followed from where Huber's leads.  Covariances are those of the weighted measurements: they allow for rows that were
+    weighted down, not for having chosen them by their residuals, and are some per cent off where noise is Gaussian or worse.
     """
 
     start: Any = "ekf"
@@ -56,8 +67,10 @@ class FactorGraph:
     tolerance: float = 1e-6
     cross_covariances: bool = False
     solver: str = "auto"
+    loss: Any = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "loss", loss_of(self.loss))
         if isinstance(self.start, str) and self.start not in STARTS:
             raise ValueError(f"start is {self.start!r}; it must be one of {', '.join(STARTS)}, or states")
         if self.solver not in SOLVERS:
@@ -79,10 +92,14 @@ class FactorGraph:
         nodes = with_prior_node(inputs)
         skip = nodes.epochs - inputs.epochs
         watch = Stopwatch()
-        chain = Chain(problem, nodes)
+        chain = chain_for(problem, nodes, self.loss)
         outcome, solver, used = self._optimize(chain, inputs, tracking)
+        if self._bank is not None:
+            outcome = search(self._bank, chain, solver, inputs, outcome, self.tolerance)
         nu, S = chain.innovations()
         details = outcome.details | {"start": used}
+        if isinstance(chain, RobustChain):
+            details |= {"loss": str(self.loss), "weights": chain.weights}
         if self.cross_covariances and not outcome.failure:
             details["cross_covariances"] = solver.cross()[skip:]
         return Estimate(
@@ -100,6 +117,12 @@ class FactorGraph:
             outcome.failure,
         )
 
+    @property
+    def _bank(self) -> Bank | None:
+        if isinstance(self.start, str):
+            return Bank() if self.start == "bank" else None
+        return self.start if isinstance(self.start, Bank) else None
+
     def _optimize(self, chain: Chain, inputs: Inputs, tracking: Tracking) -> tuple[Outcome, Solver, str]:
         """Optimise from the start asked for; the outcome, its solver, and the starts used.
 
@@ -110,6 +133,7 @@ class FactorGraph:
         if self.solver == "information" and not InformationSolver.applies(chain.problem):
             raise ValueError(f"solver 'information' cannot be used: {CERTAIN}")
         information, name = self.solver == "information", self.start if isinstance(self.start, str) else "given"
+        name = name if self._bank is None else "ekf"
         solver: Solver = InformationSolver(chain) if information else CovarianceSolver(chain)
         waiting = [name, *(s for s in ("window", "prior") if s != name)]
         tried: list[tuple[str, Outcome]] = []
@@ -118,7 +142,7 @@ class FactorGraph:
             start = waiting.pop(0)
             states, wrong = self._begin(start, chain.problem, tracking, inputs)
             doubtful = doubtful or wrong
-            outcome = optimize(
+            outcome = descend(
                 chain,
                 solver,
                 with_first(chain, states),
@@ -133,16 +157,22 @@ class FactorGraph:
                 solver, information, tried = InformationSolver(chain), True, []
                 waiting = [*(["given"] if name == "given" else []), "prior", "window"]
         outcome, used = _together(tried), ", then ".join(start for start, _ in tried)
-        if doubtful and not outcome.failure and tried[-1][0] != "prior":
-            states, _ = self._begin("prior", chain.problem, tracking, inputs)
+        for start in self._others(chain, doubtful, tried[-1][0]) if not outcome.failure else ():
+            states, _ = self._begin(start, chain.problem, tracking, inputs)
             outcome, better = self._challenge(chain, solver, outcome, with_first(chain, states))
-            used = "prior" if better else used
+            used = start if better else used
         return outcome, solver, used
+
+    def _others(self, chain: Chain, doubtful: bool, used: str) -> Iterator[str]:
+        """Where else to begin, for as long as the solution may not be the best."""
+        for start in ("window", "prior") if isinstance(chain, RobustChain) else ("prior",):
+            if start != used and (chain.disowns if isinstance(chain, RobustChain) else doubtful):
+                yield start
 
     def _challenge(self, chain: Chain, solver: Solver, outcome: Outcome, states: Array) -> tuple[Outcome, bool]:
         """The outcome, or that from other states where its cost is lower, and whether it is; the chain is left there."""
         x = chain.x.copy()
-        other = optimize(chain, solver, states, min(self.max_iterations, CHALLENGE), self.tolerance)
+        other = descend(chain, solver, states, min(self.max_iterations, CHALLENGE), self.tolerance)
         if not other.failure and other.details["cost"] < outcome.details["cost"] - 1e-6:
             return replace(other, iterations=outcome.iterations + other.iterations), True
         chain.x[:] = x
@@ -159,9 +189,11 @@ class FactorGraph:
                 raise ValueError(f"start has shape {states.shape}; it must be ({K}, {n}), and finite")
             return states, False
         if start == "window":
-            first = SlidingWindow().estimate(problem, tracking)
+            first = SlidingWindow(loss=None if self.loss is None else Cauchy()).estimate(problem, tracking)
             assert first.delayed is not None
             return first.delayed.mean, inconsistent(first.innovations, first.innovation_covariances)
+        if start == "ekf" and self.loss is not None:
+            return gated_run(problem, inputs), False
         seen = inputs if start == "ekf" else replace(inputs, z=np.full_like(inputs.z, np.nan))
         mean, _, nu, S, *_ = filter_run(problem, seen)
         return mean, inconsistent(nu, S)

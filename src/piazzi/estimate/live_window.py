@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.chain import chain_fragments
 from piazzi.estimate.live import Clock, checked_measurement
+from piazzi.estimate.losses import Loss
+from piazzi.estimate.robust_window import row_space, window_fragments
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -41,11 +42,14 @@ class LiveWindow:
         *("nu_lin", "H_lin", "dx", "mean", "covariance"),
     )
 
-    def __init__(self, problem: Problem, lag: int, lag_seconds: float | None, iterations: int) -> None:
+    def __init__(
+        self, problem: Problem, lag: int, lag_seconds: float | None, iterations: int, loss: Loss | None = None
+    ) -> None:
         self.problem, self.lag, self.lag_seconds, self.iterations = problem, lag, lag_seconds, iterations
+        self._loss = loss
         self._clock = Clock(problem)
         self._stations = {s.name: i for i, s in enumerate(problem.stations)}
-        fragments = chain_fragments(problem, "window_step", "window_live", "predict")
+        fragments = window_fragments(problem, loss, "window_live", "predict")
         self._library = kernels.load(problem.spec(*fragments, lanes=machine_lanes()))
         n, m = problem.model.n, problem.model.width
         self.mean, self.covariance = problem.mean.copy(), problem.covariance.copy()
@@ -282,7 +286,7 @@ class LiveWindow:
                 self._dx,
                 np.empty(m),
                 np.empty((m, n)),
-                np.empty(m * (m + n)),
+                row_space(self.problem, self._loss, rows),
                 np.empty((n, n)),
                 np.empty((n, n)),
             )

@@ -61,8 +61,34 @@ def _iterated(option: str) -> Mapping[str, Any]:
     return {"iterations": ITERATIONS, **_filter(option)}
 
 
-def _start(option: str) -> Mapping[str, Any]:
-    return {"start": option} if option else {}
+def _graph(option: str) -> Mapping[str, Any]:
+    """A start and a loss, in any order: ``graph:window:huber``, ``graph:bank=64``, ``graph:tukey=6``."""
+    settings: dict[str, Any] = {}
+    for word in option.split(":") if option else ():
+        new = _loss(word) or _bank(word) or {"start": word}
+        if settings.keys() & new.keys():
+            raise ValueError(f"{word!r} is one too many: give one start and one loss")
+        settings |= new
+    return settings
+
+
+def _loss(word: str) -> Mapping[str, Any]:
+    """The setting that the name of a loss means; none for another word."""
+    from piazzi.estimate.losses import LOSSES
+
+    return {"loss": word} if word.partition("=")[0] in LOSSES else {}
+
+
+def _bank(word: str) -> Mapping[str, Any]:
+    """The setting that "bank=MEMBERS" means; none for another word."""
+    name, equals, members = word.partition("=")
+    if name != "bank" or not equals:
+        return {}
+    if not re.fullmatch(r"\d{1,9}", members, re.ASCII):
+        raise ValueError(f"bank is {members!r}; it must be a number of starts, such as bank=64")
+    from piazzi.estimate.bank import Bank
+
+    return {"start": Bank(int(members))}
 
 
 def _plain(option: str) -> Mapping[str, Any]:
@@ -72,6 +98,17 @@ def _plain(option: str) -> Mapping[str, Any]:
 
 
 def _window(option: str) -> Mapping[str, Any]:
+    """A lag with iterations, and a loss: ``window:100x3:huber``."""
+    size, _, word = option.partition(":")
+    if not word and _loss(size):
+        size, word = "", size
+    loss = _loss(word)
+    if word and not loss:
+        raise ValueError(f"{word!r} is no loss: write window:LAG:huber, window:LAG:cauchy or window:LAG:tukey")
+    return {**_size(size), **loss}
+
+
+def _size(option: str) -> Mapping[str, Any]:
     found = re.fullmatch(r"(\d{1,9})(?:x(\d{1,9}))?", option, re.ASCII)
     if option and not found:
         raise ValueError("write window:LAG or window:LAGxITERATIONS, such as window:100 or window:100x3")
@@ -115,14 +152,14 @@ ESTIMATORS: Mapping[str, Entry] = {
         _plain,
     ),
     "graph": Entry(
-        "graph[:ekf|:prior|:window]",
-        "factor graph over all states, started from one of these",
+        "graph[:ekf|:prior|:window|:bank[=N]][:LOSS[=K]]",
+        "factor graph over all states, started from one of these; a LOSS (huber, cauchy, tukey) withstands outliers",
         "piazzi.estimate.factor_graph:FactorGraph",
         ("delayed",),
-        _start,
+        _graph,
     ),
     "window": Entry(
-        "window:LAG[xITERATIONS]",
+        "window:LAG[xITERATIONS][:LOSS[=K]]",
         "factor graph over the newest LAG states",
         "piazzi.estimate.sliding_window:SlidingWindow",
         ("realtime", "delayed"),

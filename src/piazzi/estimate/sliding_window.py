@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.chain import chain_fragments
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.inputs import Inputs, prepare
 from piazzi.estimate.live_window import LiveWindow, window_opens
+from piazzi.estimate.losses import loss_of
+from piazzi.estimate.robust_window import row_space, row_weights, window_fragments
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem, Tracking
@@ -29,20 +31,27 @@ class SlidingWindow:
         Gauss-Newton steps per epoch.
     lag_seconds : float, optional
         Keep the states of the last so many seconds instead.
+    loss : Huber, Cauchy or Tukey, or "huber", "cauchy" or "tukey"; optional
+        Rows that do not fit the others are weighted down; ``details["weights"]`` (J,) has the weight of each row when its
+        state left the window.  Covariances are those of the weighted rows (see `FactorGraph`).
 
     Notes
     -----
     `Estimate.mean` is the newest state as known in real time; `Estimate.delayed` has each state as it left the window, and
     for those still inside at the end the final window's estimate.  A state that leaves is marginalised by one linearised
     Kalman step: its measurements keep the linearisation of its last step, its dynamics are linearised at its current estimate.
-    One state and one iteration are the extended Kalman filter; all states, iterated, are the full graph.
+    One state and one iteration are the extended Kalman filter; all states, iterated, are the full graph.  With a loss, the
+    rows of the newest epoch are at first weighted by their innovation nu^T S^-1 nu, later by their residual alone, like all
+    others: while little is known, a large innovation says nothing against a row.
     """
 
     lag: int = 100
     iterations: int = 1
     lag_seconds: float | None = None
+    loss: Any = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "loss", loss_of(self.loss))
         for what in ("lag", "iterations"):
             value = getattr(self, what)
             if value != int(value) or value < 1:
@@ -67,11 +76,12 @@ class SlidingWindow:
         """
         inputs = prepare(problem, tracking)
         begin = self.first_states(inputs.t)
-        library = kernels.load(problem.spec(*chain_fragments(problem, "window_step", "window"), lanes=machine_lanes()))
+        library = kernels.load(problem.spec(*window_fragments(problem, self.loss, "window"), lanes=machine_lanes()))
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
         J = len(inputs.z)
         x, mean, P, P_delayed = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N)), np.empty((K, N, N))
         nu, S = np.empty((J, M)), np.empty((J, M, M))
+        work = row_space(problem, self.loss, J)
         watch = Stopwatch()
         library.run_window(
             K,
@@ -86,7 +96,7 @@ class SlidingWindow:
             problem.process_noise.covariance,
             problem.mean,
             problem.covariance,
-            *window_space(problem, inputs, begin),
+            *window_space(problem, inputs, begin, work),
             x,
             P_delayed,
             mean,
@@ -95,18 +105,21 @@ class SlidingWindow:
             S,
         )
         seconds = watch.seconds()
-        details = {"lag": self.lag if self.lag_seconds is None else None, "lag_seconds": self.lag_seconds, "solver": "chain"}
+        lag = self.lag if self.lag_seconds is None else None
+        details: dict[str, Any] = {"lag": lag, "lag_seconds": self.lag_seconds, "solver": "chain"}
+        if self.loss is not None:
+            details |= {"loss": str(self.loss), "weights": row_weights(work, J)}
         steps = K * self.iterations
         late = Estimate(problem, tracking, x, P_delayed, nu, S, steps, seconds, "delayed", None, details)
         return Estimate(problem, tracking, mean, P, nu, S, steps, seconds, "realtime", late, details)
 
     def start(self, problem: Problem) -> LiveWindow:
         """A window that takes one measurement at a time, beginning at the prior."""
-        return LiveWindow(problem, self.lag, self.lag_seconds, self.iterations)
+        return LiveWindow(problem, self.lag, self.lag_seconds, self.iterations, self.loss)
 
 
-def window_space(problem: Problem, inputs: Inputs, begin: Array) -> tuple[Array, ...]:
-    """Buffers of the largest window, in the order of the kernel."""
+def window_space(problem: Problem, inputs: Inputs, begin: Array, work: Array) -> tuple[Array, ...]:
+    """Buffers of the largest window, in the order of the kernel; `work` is the one for linearised rows."""
     N, M = problem.model.n, problem.model.width
     newest = np.arange(len(begin))
     W = int((newest - begin).max()) + 1
@@ -126,7 +139,7 @@ def window_space(problem: Problem, inputs: Inputs, begin: Array) -> tuple[Array,
         np.empty((W, N)),
         np.empty(M),
         np.empty((M, N)),
-        np.empty(M * (M + N)),
+        work,
         np.empty((N, N)),
         np.empty((N, N)),
     )

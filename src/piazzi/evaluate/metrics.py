@@ -13,6 +13,7 @@ from piazzi.problem.checks import Array
 
 _CHUNK = 1 << 14  # epochs at a time: the work space stays in the processor's cache
 _DOUBTFUL = 1e-9  # pivots of correlations from here down may be rounding errors: eigenvalues decide
+_OUTLIER = 0.1  # weight below which a row is taken for an outlier
 _FAR = 10.0  # times the 99.9 % quantile of chi-square: no matched run comes near, however correlated in time
 
 
@@ -85,6 +86,8 @@ def nis(estimate: Estimate) -> Consistency:
     measured = ~np.isnan(estimate.tracking.padded(estimate.innovations.shape[1]))
     if "rejected" in estimate.details:  # a gate's outliers say nothing about what the filter used
         measured &= ~np.asarray(estimate.details["rejected"], dtype=bool)[:, None]
+    if "weights" in estimate.details:  # nor do those of a loss; hardly a good row gets so small a weight
+        measured &= np.asarray(estimate.details["weights"])[:, None] >= _OUTLIER
     return squared_in_sigmas(estimate.innovations, estimate.innovation_covariances, measured)
 
 
