@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,7 +11,7 @@ from piazzi.cli import options, output
 from piazzi.cli.running import DONE, NOT_ESTIMATED
 
 if TYPE_CHECKING:
-    from piazzi.estimate import Estimate
+    from piazzi.estimate import Estimate, Forecast
     from piazzi.evaluate import Comparison
 
 SCHEMA = "piazzi.estimate/1"
@@ -25,6 +26,12 @@ ENDINGS = (".json", ".csv", ".npz", ".nc")
 @options.as_json
 @options.seed
 @options.scenario
+@click.option(
+    "--predict",
+    "ahead",
+    metavar="AHEAD",
+    help="How far to carry the last state forward, and with what doubt: 2h, or 10min,1d, or 1d/1h for every hour of a day.",
+)
 @click.option("--follow", metavar="FILE", help="Read measurements as lines of CSV from FILE, - for stdin, as they come.")
 @click.option("--checkpoint", metavar="FILE", help="With --follow: where to keep the state, and to go on from.")
 def command(
@@ -34,6 +41,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
+    ahead: str | None,
     follow: str | None,
     checkpoint: str | None,
 ) -> int:
@@ -44,10 +52,13 @@ def command(
     Examples:
       piazzi estimate tracking.npz
       piazzi estimate tracking.npz --with window:100 -o orbit.nc
+      piazzi estimate tracking.npz --predict 10min,2h
       piazzi estimate rows.csv --scenario b612-range --json
       piazzi simulate b612-range -o - | piazzi estimate - --scenario b612-range
       sensor | piazzi estimate b612-range --follow - --checkpoint state.npz
     """
+    if ahead is not None and follow is not None:
+        raise click.UsageError("--predict and --follow do not go together", click.get_current_context())
     if follow is not None:
         return _follow(source, options.parsed(names, (DEFAULT,)), output_file, as_json, follow, checkpoint)
     if checkpoint is not None:
@@ -56,17 +67,22 @@ def command(
     estimators = options.parsed(names, (DEFAULT,))
     if output_file is not None and len(estimators) > 1:
         raise click.UsageError("-o writes one estimate: give one --with, or use compare", click.get_current_context())
+    if ahead is not None:
+        from piazzi.cli.ahead import times_ahead
+
+        times_ahead(ahead, 0.0)  # what cannot be read is told before anything is computed
     from piazzi.cli.comparing import run_comparison
 
     source_name, comparison = run_comparison(source, estimators, seed, scenario)
-    document = to_dict(comparison)
+    forecasts = {} if ahead is None else predicted(comparison, ahead)
+    document = to_dict(comparison, forecasts)
     if output_file is not None:
         write(output_file, comparison, document)
     if as_json:
         if output_file != output.STDOUT:
             output.print_json(document)
     elif output_file != output.STDOUT:
-        _print(comparison, source_name, output_file)
+        _print(comparison, source_name, output_file, forecasts)
     return DONE if comparison.success else NOT_ESTIMATED
 
 
@@ -83,8 +99,19 @@ def _follow(
     return follow(load_problem(source), next(iter(estimators.values())), stream, output_file, checkpoint, as_json)
 
 
-def to_dict(comparison: Comparison) -> dict[str, Any]:
-    """The comparison's object with units, and in every row the last state with its standard deviations."""
+def predicted(comparison: Comparison, ahead: str) -> dict[str, Forecast]:
+    """Every estimate's last state carried forward; one that is not finite has none."""
+    import numpy as np
+
+    from piazzi.cli.ahead import times_ahead
+
+    times = times_ahead(ahead, float(comparison.tracking.times[-1]))
+    usable = {name: e for name, e in comparison.estimates.items() if np.isfinite([*e.mean[-1], *e.covariance[-1].flat]).all()}
+    return {name: estimate.predict(times) for name, estimate in usable.items()}
+
+
+def to_dict(comparison: Comparison, forecasts: Mapping[str, Forecast]) -> dict[str, Any]:
+    """The comparison's object with units, and in every row the last state with its sigmas and, if asked, later ones."""
     from piazzi.evaluate.quantities import finite
 
     model, views = comparison.problem.model, comparison.views
@@ -98,7 +125,20 @@ def to_dict(comparison: Comparison) -> dict[str, Any]:
                 "mean": [finite(v) for v in estimate.mean[-1].tolist()],
                 "sigma": [finite(v**0.5) if v >= 0 else None for v in variances],
             }
+        if row["estimator"] in forecasts:
+            row["prediction"] = prediction(forecasts[row["estimator"]])
     return document
+
+
+def prediction(forecast: Forecast) -> dict[str, Any]:
+    """Times, means, covariances, standard deviations and their growth as lists, numbers that are not finite as None."""
+    from piazzi.evaluate.quantities import finite
+
+    def listed(values: Any) -> Any:
+        return [listed(v) for v in values] if isinstance(values, list) else finite(values)
+
+    names = ("times", "mean", "sigma", "growth", "covariance")
+    return {name: listed(getattr(forecast, name).tolist()) for name in names}
 
 
 def write(path: str, comparison: Comparison, document: dict[str, Any]) -> None:
@@ -126,10 +166,11 @@ def series(estimate: Estimate) -> dict[str, Any]:
     return out
 
 
-def _print(comparison: Comparison, source_name: str, output_file: str | None) -> None:
-    from piazzi.present.tables import heading, state_table
+def _print(comparison: Comparison, source_name: str, output_file: str | None, forecasts: Mapping[str, Forecast]) -> None:
+    from piazzi.present.tables import forecast_table, heading, state_table
 
     parts: list[Any] = [heading(comparison.problem, comparison.tracking, source_name), ""]
     for name, estimate in comparison.estimates.items():  # at the last epoch both views of a window are one
         parts += [state_table(name, estimate), ""]
+        parts += [forecast_table(name, forecasts[name]), ""] if name in forecasts else []
     output.print_rich(*parts, comparison, *([f"Wrote {output_file}"] if output_file and comparison.estimates else []))

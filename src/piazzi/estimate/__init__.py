@@ -3,6 +3,7 @@
 from piazzi.estimate.bank import Bank
 from piazzi.estimate.estimator import Estimate, Estimator
 from piazzi.estimate.factor_graph import FactorGraph
+from piazzi.estimate.forecast import Forecast
 from piazzi.estimate.kalman import ExtendedKalmanFilter, Prediction, Updated, predict, update
 from piazzi.estimate.live import LiveFilter
 from piazzi.estimate.live_root import LiveRootFilter
@@ -20,6 +21,7 @@ __all__ = [
     "Estimator",
     "ExtendedKalmanFilter",
     "FactorGraph",
+    "Forecast",
     "Huber",
     "LiveFilter",
     "LiveRootFilter",

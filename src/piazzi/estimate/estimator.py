@@ -15,6 +15,8 @@ from piazzi.problem.checks import Array
 if TYPE_CHECKING:
     import xarray
 
+    from piazzi.estimate.forecast import Forecast
+
 View = Literal["realtime", "delayed"]
 
 
@@ -103,6 +105,25 @@ class Estimate:
         bad = ~np.isfinite(self.mean[k])
         state = f" ({', '.join(np.array(self.names)[bad])})" if bad.any() else ""
         return f"{what} from epoch {k} (t = {self.times[k]:g} s){state}"
+
+    def predict(self, times: Any) -> Forecast:
+        """The last belief carried forward, with the process noise and manoeuvres on the way, and how it grows.
+
+        Parameters
+        ----------
+        times : (P,) or one, s
+            At or after the last epoch, not decreasing.  The way there is cut into equal parts no longer than the tracking's
+            median interval, so that steps and process noise are those of the estimation; covariances are carried by the
+            transition matrices.  Between epochs, an estimate comes from a row of missing values (NaN) there.
+
+        Raises
+        ------
+        ValueError
+            For a time before the last epoch, times that decrease or are not finite, or a last belief that is not finite.
+        """
+        from piazzi.estimate.forecast import forecast
+
+        return forecast(self, times)
 
     def to_dataset(self) -> xarray.Dataset:
         """Times, means, covariances and innovations as a labelled dataset with units."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate import Estimate
+from piazzi.estimate import Estimate, Forecast
 from piazzi.evaluate.metrics import errors
 from piazzi.evaluate.quantities import display_of, duration, number, printable, with_sigma
 from piazzi.problem import Problem, Tracking
@@ -62,6 +62,27 @@ def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
             e = float(error[k, i]) * show.factor
             texts.append(with_sigma(e, sigma * show.factor)[0] if np.isfinite(e) else "-")
         table.add_row(Text(state), *texts, Text(printable(show.unit)))
+    return Group(Text(printable(title), style="bold"), table)
+
+
+def forecast_table(name: str, forecast: Forecast) -> Any:
+    """A rich table of every state at each predicted time: value, sigma, and that over the one at the last epoch."""
+    from rich import box
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    title = f"Predicted from t = {forecast.start:g} s, {name}, without measurements"
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    for heading in ("ahead", "state", "estimate", "sigma", "growth", "unit"):
+        table.add_column(heading, justify="left" if heading in ("state", "unit") else "right", no_wrap=True)
+    shows = [display_of(forecast.problem.model.unit(s), forecast.mean[:, i].tolist()) for i, s in enumerate(forecast.names)]
+    for k, t in enumerate(forecast.times.tolist()):
+        for i, (state, show) in enumerate(zip(forecast.names, shows, strict=True)):
+            ahead = duration(t - forecast.start) if i == 0 else ""
+            value, sigma = (float(a[k, i]) * show.factor for a in (forecast.mean, forecast.sigma))
+            growth = f"{number(float(forecast.growth[k, i]), 3)}x"
+            table.add_row(ahead, Text(state), *with_sigma(value, sigma), growth, Text(printable(show.unit)))
     return Group(Text(printable(title), style="bold"), table)
 
 

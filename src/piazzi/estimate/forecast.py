@@ -1,0 +1,118 @@
+"""What an estimate says about times after its last epoch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array, numeric
+
+if TYPE_CHECKING:
+    from piazzi.estimate.estimator import Estimate
+
+MOST_PARTS = 10**7
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Beliefs carried forward from the last epoch of an estimate.
+
+    Attributes
+    ----------
+    problem : what was estimated
+    start : float, time of the last epoch, s
+    times : (P,), s
+    mean : (P, n), covariance : (P, n, n)
+    sigma : (P, n), standard deviations
+    growth : (P, n), sigma over that at the last epoch; 1 where a value is known and stays so, infinite where it was known
+    """
+
+    problem: Problem
+    start: float
+    times: Array
+    mean: Array
+    covariance: Array
+    growth: Array
+
+    def __post_init__(self) -> None:
+        for a in (self.times, self.mean, self.covariance, self.growth):
+            a.setflags(write=False)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns of `mean`."""
+        return self.problem.model.names
+
+    @property
+    def sigma(self) -> Array:
+        return _sigma(self.covariance)
+
+    def __str__(self) -> str:
+        lines = [f"{'t [s]':>14s}" + "".join(f"  {name:>14s} {'sigma':>9s} {'growth':>8s}" for name in self.names)]
+        for t, m, s, g in zip(self.times, self.mean, self.sigma, self.growth, strict=True):
+            cells = (f"  {a:14.7g} {b:9.3g} {c:7.3g}x" for a, b, c in zip(m, s, g, strict=True))
+            lines.append(f"{t:14.7g}" + "".join(cells))
+        return "\n".join(lines)
+
+
+def forecast(estimate: Estimate, times: Any) -> Forecast:
+    """The estimate's last belief at later times; see `Estimate.predict`."""
+    problem, start, n = estimate.problem, float(estimate.times[-1]), estimate.problem.model.n
+    at = _checked(times, start)
+    last, P_last = np.ascontiguousarray(estimate.mean[-1]), np.ascontiguousarray(estimate.covariance[-1])
+    if not (np.isfinite(last).all() and np.isfinite(P_last).all()):
+        raise ValueError(f"nothing can be carried forward: {estimate.message}")
+    mean, P = np.empty((len(at), n)), np.empty((len(at), n, n))
+    kernels.load(problem.spec("transition", problem.noise_fragment, "forecast")).run_forecast(
+        len(at), at, start, *_parts(estimate, at), problem.given, problem.process_noise.covariance, last, P_last, mean, P
+    )
+    before, after = _sigma(P_last[None]), _sigma(P)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        growth = np.where((after == 0) & (before == 0), 1.0, after / before)
+    return Forecast(problem, start, at, mean, P, growth)
+
+
+def _sigma(covariance: Array) -> Array:
+    """Standard deviations (P, n) of covariances (P, n, n)."""
+    return np.asarray(np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)))
+
+
+def _checked(times: Any, start: float) -> Array:
+    at = np.array(numeric(times, "times").reshape(-1))
+    if not at.size:
+        raise ValueError("there are no times to predict")
+    for i, t in enumerate(at.tolist()):
+        if not np.isfinite(t):
+            raise ValueError(f"time {i} is {t}; it must be finite")
+        if t < start:
+            raise ValueError(
+                f"time {i} is {t:g} s, before the last epoch at {start:g} s: for an estimate there, give the tracking a row of "
+                "missing values (NaN) at that time"
+            )
+        if i and t < at[i - 1]:
+            raise ValueError(f"times must not decrease: time {i} is {t:g} s, after {at[i - 1]:g} s")
+    return at
+
+
+def _parts(estimate: Estimate, at: Array) -> tuple[Array, Array, Array]:
+    """The way to each time: in how many parts, the substeps of a part, and its noise scale.
+
+    Equal parts no longer than the tracking's median interval: a fixed number of substeps, a step that is the model itself and
+    noise per step all mean one such interval.
+    """
+    problem = estimate.problem
+    assert problem.integrator is not None
+    known = estimate.times if problem.prior_time is None else np.append(problem.prior_time, estimate.times)
+    usual = [gap for gap in np.diff(known).tolist() if gap > 0]
+    dt = np.diff(at, prepend=estimate.times[-1])
+    wanted = np.ceil(dt / np.median(usual) * (1 - 1e-9)) if usual else np.sign(dt)
+    if wanted.sum() > MOST_PARTS:
+        raise ValueError(
+            f"the last time is {wanted.sum():.3g} of the tracking's intervals ahead; at most {MOST_PARTS:g} are carried forward"
+        )
+    part = dt / np.maximum(wanted, 1)
+    return wanted.astype(np.int64), problem.integrator.counts(part), problem.process_noise.scale(part)
