@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import piazzi as pz
@@ -16,7 +17,10 @@ def test_there_are_examples():
     assert EXAMPLES
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+SLOW = {"ground_stations": pytest.mark.slow}  # 18 values take a minute to compile
+
+
+@pytest.mark.parametrize("path", [pytest.param(p, id=p.stem, marks=SLOW.get(p.stem, ())) for p in EXAMPLES])
 def test_an_example_is_sound_and_its_graph_knows_its_errors(path):
     checked = subprocess.run([PIAZZI, "scenarios", "check", str(path)], capture_output=True, text=True, timeout=60)
     assert checked.returncode == 0, checked.stderr
@@ -31,3 +35,27 @@ def test_an_example_is_sound_and_its_graph_knows_its_errors(path):
 def test_a_newcomers_problem_takes_under_30_lines():
     text = next(path for path in EXAMPLES if path.stem == "falling_probe").read_text()
     assert sum(1 for line in text.splitlines() if line.strip() and not line.startswith("#")) < 30
+
+
+@pytest.mark.slow
+def test_real_tracking_of_a_satellite_by_three_ground_stations(data_dir):
+    """Batch and graph leave the noise that the recording's authors state; filters that start close end at the same place."""
+    sys.path.insert(0, str(EXAMPLES[0].parent))
+    try:
+        import ground_stations
+    finally:
+        sys.path.pop(0)
+    problem, tracking = ground_stations.load(data_dir / "ground_stations" / "range_range_rate.txt")
+    batch, graph = (e.estimate(problem, tracking) for e in (pz.BatchLeastSquares(), pz.FactorGraph()))
+    sigma = np.sqrt(batch.covariance.diagonal(axis1=1, axis2=2))
+    for estimate in (batch, graph):
+        assert estimate.success, estimate.message
+        assert estimate.iterations <= 6
+        rms = ground_stations.residual_rms(problem, tracking, estimate)
+        assert [round(rms[0], 4), round(rms[1], 5)] == [0.0097, 0.00100]
+        assert (abs(estimate.mean - batch.mean) <= 1e-3 * sigma).all()
+    close = ground_stations.started_from(problem, batch, 10.0)
+    for estimator in (pz.ExtendedKalmanFilter(), pz.SlidingWindow(100)):
+        estimate = estimator.estimate(close, tracking)
+        assert estimate.success, estimate.message
+        assert (abs(estimate.mean[-1] - batch.mean[-1]) <= 3 * sigma[-1]).all()

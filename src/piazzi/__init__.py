@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from piazzi.estimate import (
         Bank,
+        BatchLeastSquares,
         Cauchy,
         Estimate,
         ExtendedKalmanFilter,
@@ -66,7 +67,9 @@ _WHERE = {
     **dict.fromkeys(("Midpoint", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Taylor"), "piazzi.kernels"),
     **dict.fromkeys(("Gaussian", "Manoeuvre", "Problem", "ProcessNoise", "Station", "Tracking", "Truth"), "piazzi.problem"),
     "with_gauss_markov": "piazzi.problem",
-    **dict.fromkeys(("Estimate", "ExtendedKalmanFilter", "FactorGraph", "LiveFilter", "LiveWindow"), "piazzi.estimate"),
+    **dict.fromkeys(
+        ("BatchLeastSquares", "Estimate", "ExtendedKalmanFilter", "FactorGraph", "LiveFilter", "LiveWindow"), "piazzi.estimate"
+    ),
     **dict.fromkeys(("Prediction", "SlidingWindow", "Smoother", "Updated", "predict", "update"), "piazzi.estimate"),
     **dict.fromkeys(("Forecast", "LiveRootFilter", "SquareRootKalmanFilter", "UnscentedKalmanFilter"), "piazzi.estimate"),
     **dict.fromkeys(("Comparison", "Observability", "WindowTrade"), "piazzi.evaluate"),
@@ -81,6 +84,7 @@ _WHERE = {
 __version__ = "0.1.0"
 __all__ = [
     "Bank",
+    "BatchLeastSquares",
     "Cauchy",
     "Comparison",
     "Discrete",

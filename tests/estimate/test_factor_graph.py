@@ -46,7 +46,7 @@ def test_founding_recording(data_dir, start):
         assert estimate.iterations <= 6
 
 
-@pytest.mark.parametrize("solver", ["chain", "information"])
+@pytest.mark.parametrize("solver", ["chain", "bordered"])
 @pytest.mark.parametrize("start", ["ekf", "prior"])
 def test_exact_to_rounding(solver, start):
     """Against 50 digits on a shortened problem: states to 1e-9 of their sigma, covariances to 1e-8, neighbours included."""
@@ -188,14 +188,14 @@ def two_clocks(sigma):
 
 
 @pytest.mark.parametrize("sigma", [1e2, 1e4, 1e6, 1e9, 1e12])
-def test_diffuse_prior_is_solved_in_information_form(sigma, monkeypatch):
+def test_diffuse_prior_is_solved_in_bordered_form(sigma, monkeypatch):
     """Chosen by itself, named in the result, and exact."""
     monkeypatch.setenv("PIAZZI_JIT", "0")
     problem, tracking, chain = two_clocks(sigma)
     exact = quad.smooth(*chain)
     estimate = pz.FactorGraph(cross_covariances=True).estimate(problem, tracking)
     assert estimate.success, estimate.message
-    assert estimate.details["solver"] == ("square-root information" if sigma >= 1e4 else "chain")
+    assert estimate.details["solver"] == ("bordered" if sigma >= 1e4 else "chain")
     unit = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
     tolerance = 1e-9 if sigma >= 1e4 else 1e-7  # the chain loses the square of the ratio of the widths
     assert (np.abs(estimate.mean - exact.mean) / unit).max() <= tolerance
@@ -212,24 +212,49 @@ def test_chain_refuses_a_diffuse_prior(monkeypatch):
     assert not estimate.success
     assert "too wide" in estimate.message
     assert "solver='auto'" in estimate.message
+
+
+def test_prior_that_is_certain_of_one_value_and_open_about_another(monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
     model = pz.Model(["a", "b"], ["0", "0"], [pz.Sensor("sum", ["a + b"])])
     half_known = pz.Problem(model, pz.Gaussian([0.0, 1.0], [1e18, 0.0]), None, [pz.Station("here", "sum", 1.0)])
     estimate = pz.FactorGraph().estimate(half_known, pz.Tracking(np.arange(3.0), [1.0, 2.0, 3.0]))
-    assert not estimate.success
-    assert "the prior is certain about some value" in estimate.message
-    with pytest.raises(ValueError, match=r"'information' cannot be used: .* certain about some value"):
-        pz.FactorGraph(solver="information").estimate(half_known, pz.Tracking([0.0], [1.0]))
+    assert estimate.success, estimate.message
+    assert estimate.details["solver"] == "bordered"
+    assert_allclose(estimate.mean, np.tile([1.0, 1.0], (3, 1)), atol=1e-12)
+    assert_allclose(estimate.covariance, np.tile([[1.0 / 3.0, 0.0], [0.0, 0.0]], (3, 1, 1)), atol=1e-12)
 
 
-def test_information_form_says_where_a_step_has_no_inverse(monkeypatch):
-    """A step that forgets a state altogether, under a prior too wide for covariances."""
+def test_constant_that_process_noise_moves_stays_in_the_chain(monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["a"], ["0"], [pz.Sensor("sum", ["a + b"])], [pz.Parameter("b", "estimated")])
+    noise = pz.ProcessNoise(np.diag([0.0, 0.1]), "step")
+    tracking = pz.Tracking(np.arange(3.0), [1.0, 2.0, 3.0])
+    for sigma, told in ((1.0, ""), (1e9, "process noise moves an estimated constant")):
+        prior, constant = pz.Gaussian([0.0], [sigma**2]), pz.Gaussian(1.0, 1.0)
+        problem = pz.Problem(model, prior, noise, [pz.Station("here", "sum", 1.0)], {"b": constant})
+        estimate = pz.FactorGraph().estimate(problem, tracking)
+        assert estimate.success == (not told)
+        assert told in estimate.message
+        with pytest.raises(ValueError, match=r"'bordered' cannot be used: .* process noise"):
+            pz.FactorGraph(solver="bordered").estimate(problem, tracking)
+
+
+def test_step_that_forgets_a_state_under_a_wide_prior(monkeypatch):
+    """It has no inverse, and needs none: against 50 digits."""
     monkeypatch.setenv("PIAZZI_JIT", "0")
     model = pz.Model(["x", "v"], ["x + dt*v", "0.0*v"], [pz.Sensor("place", ["x"])], discrete=True)
     station, noise = pz.Station("here", "place", 0.01), pz.ProcessNoise([1e-2, 1e-2], "step")
     problem = pz.Problem(model, pz.Gaussian([0.0, 0.0], [1e12, 1e12]), noise, [station])
-    estimate = pz.FactorGraph().estimate(problem, pz.Tracking(np.arange(6.0), np.arange(6.0)))
-    assert not estimate.success
-    assert "'x' is not finite from t = 1 s" in estimate.message
+    z = np.array([0.0, 1.0, 1.5, 2.5, 4.0, 5.0])
+    estimate = pz.FactorGraph().estimate(problem, pz.Tracking(np.arange(6.0), z))
+    assert estimate.success, estimate.message
+    A, S, H, R = np.array([[1.0, 1.0], [0.0, 0.0]]), 0.1 * np.eye(2), np.array([[1.0, 0.0]]), np.array([[0.01]])
+    seen = [dense.Seen(np.array([v]), H, R) for v in z]
+    exact = quad.smooth([0.0, 0.0], 1e12 * np.eye(2), [A] * 5, [S] * 5, seen)
+    unit = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
+    assert (np.abs(estimate.mean - exact.mean) / unit).max() <= 1e-9
+    assert (np.abs(estimate.covariance - exact.covariance) / (unit[:, :, None] * unit[:, None, :])).max() <= 1e-9
 
 
 def test_convergence_looks_at_measurements_too(monkeypatch):
@@ -270,7 +295,7 @@ def blowing_up():
     return problem, pz.Tracking(np.arange(8) * 0.05, np.ones(8))
 
 
-@pytest.mark.parametrize("solver", ["auto", "chain", "information"])
+@pytest.mark.parametrize("solver", ["auto", "chain", "bordered"])
 @pytest.mark.parametrize("start", STARTS)
 def test_dynamics_that_become_infinite_are_named(start, solver, monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
@@ -321,14 +346,27 @@ def test_failed_start_is_followed_by_others():
     assert (np.abs(lost.mean - wanted.mean) / sigma).max() < 1e-5
 
 
-def test_huge_prior_without_enough_measurements_keeps_its_width(monkeypatch):
-    """What the measurements do not tell stays as wide as the prior had it; nothing is invented."""
+def test_what_nobody_sees_under_a_huge_prior_is_named(monkeypatch):
+    """What the measurements do not tell stays as wide as the prior had it; nothing is invented, and it is no success."""
     monkeypatch.setenv("PIAZZI_JIT", "0")
     model = pz.Model(["seen", "unseen"], ["0", "0"], [pz.Sensor("first", ["seen"])])
-    problem = pz.Problem(model, pz.Gaussian([0.0, 5.0], [1e30, 1e30]), None, [pz.Station("here", "first", 1.0)])
-    estimate = pz.FactorGraph().estimate(problem, pz.Tracking(np.arange(4.0), [1.0, 2.0, 3.0, 2.0]))
-    assert_allclose(estimate.mean, np.tile([2.0, 5.0], (4, 1)))
-    assert_allclose(np.diagonal(estimate.covariance, axis1=1, axis2=2), np.tile([0.25, 1e30], (4, 1)))
+    tracking = pz.Tracking(np.arange(4.0), [1.0, 2.0, 3.0, 2.0])
+    for variance, told in ((1e30, True), (1e2, False)):
+        problem = pz.Problem(model, pz.Gaussian([0.0, 5.0], [1e30, variance]), None, [pz.Station("here", "first", 1.0)])
+        estimate = pz.FactorGraph().estimate(problem, tracking)
+        assert_allclose(estimate.mean, np.tile([2.0, 5.0], (4, 1)))
+        assert_allclose(np.diagonal(estimate.covariance, axis1=1, axis2=2), np.tile([0.25, variance], (4, 1)))
+        assert estimate.success == (not told)
+        assert ("do not determine 'unseen'" in estimate.message) == told
+
+
+def test_combination_that_nobody_sees_is_named(monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["a", "b"], ["0", "0"], [pz.Sensor("sum", ["a + b"])])
+    problem = pz.Problem(model, pz.Gaussian([1.0, 1.0], [1e20, 1e20]), None, [pz.Station("here", "sum", 1.0)])
+    estimate = pz.FactorGraph().estimate(problem, pz.Tracking(np.arange(3.0), [1.0, 2.0, 3.0]))
+    assert not estimate.success
+    assert "combination +0.71 a -0.71 b" in estimate.message or "combination +0.71 b -0.71 a" in estimate.message
 
 
 # ---- settings --------------------------------------------------------------------------------------------------------

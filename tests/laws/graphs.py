@@ -12,15 +12,12 @@ from tests.references.dense import Seen
 class LinearCase:
     """A random linear-Gaussian problem with several stations and several rows per epoch, and the matrices of an oracle.
 
-    `rank` is that of the process noise (None: full); `sure` makes the first state certain from the
-    start; a `rotation` forgets nothing, so that its inverse is as good as it.
+    `rank` is that of the process noise (None: full); `sure` makes the first state certain from the start.
     """
 
-    def __init__(self, n, widths, seed, *, rank=None, missing=0.2, epochs=6, sure=False, rotation=False):
+    def __init__(self, n, widths, seed, *, rank=None, missing=0.2, epochs=6, sure=False):
         rng = np.random.default_rng(seed)
         self.A = random_stable(rng, n) + 0.3 * np.eye(n)
-        if rotation:
-            self.A = 0.97 * np.linalg.qr(rng.standard_normal((n, n)))[0]
         self.Q = np.zeros((n, n)) if rank == 0 else random_covariance(rng, n, rank)
         self.H = [rng.standard_normal((m, n)) for m in widths]
         self.R = [random_covariance(rng, m) for m in widths]

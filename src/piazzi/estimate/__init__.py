@@ -1,6 +1,7 @@
 """Estimators: frozen settings with one verb, ``estimate(problem, tracking) -> Estimate``."""
 
 from piazzi.estimate.bank import Bank
+from piazzi.estimate.batch import BatchLeastSquares
 from piazzi.estimate.estimator import Estimate, Estimator
 from piazzi.estimate.factor_graph import FactorGraph
 from piazzi.estimate.forecast import Forecast
@@ -16,6 +17,7 @@ from piazzi.estimate.unscented import UnscentedKalmanFilter
 
 __all__ = [
     "Bank",
+    "BatchLeastSquares",
     "Cauchy",
     "Estimate",
     "Estimator",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -39,6 +39,9 @@ def chain_fragments(problem: Problem, *last: str) -> tuple[str, ...]:
     )
 
 
+ROUNDING = 4 * float(np.finfo(float).eps)
+
+
 @lru_cache(maxsize=64)
 def solve_spec(n: int, width: int, noise_varies: bool) -> KernelSpec:
     """The kernels that solve a linearised chain: they depend on its sizes only, so all models of one size share them."""
@@ -57,11 +60,12 @@ def tether_of(problem: Problem) -> Array:
 class Chain:
     """States `x` (K, n) of one problem and everything that is linearised about them."""
 
+    reweighted: ClassVar[bool] = False  # whether rows are weighed anew at every step, which converges linearly
+
     def __init__(self, problem: Problem, inputs: Inputs) -> None:
         self.problem, self.inputs = problem, inputs
         self.library = kernels.load(problem.spec(*chain_fragments(problem, "graph_linearize"), lanes=machine_lanes()))
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
-        self.solving = kernels.load(solve_spec(N, M, problem.noise_varies))
         J = len(inputs.z)
         self.x, self.f, self.Phi = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N))
         self.Q_all = np.empty((K if problem.noise_varies else 1, N, N))
@@ -105,11 +109,25 @@ class Chain:
         self._linearize()
         return 0.5 * float(self.report[: PRIOR + 1].sum())
 
-    def widest(self) -> float:
-        """Largest predicted variance of a measurement in units of its noise, after a solve."""
-        i = self.inputs
-        self.solving.graph_probe(i.epochs, i.first_row, self.nu, self.H, self.P_pred, self.report)
-        return float(self.report[WIDEST])
+    def largest_step(self, covariance: Array) -> float:
+        """The largest step in standard deviations, without rounding; infinite where a value that is certain moves."""
+        variance = np.diagonal(covariance, axis1=1, axis2=2)
+        with np.errstate(all="ignore"):
+            moved = np.maximum(np.abs(self.dx) - ROUNDING * np.abs(self.x), 0.0)
+            sigmas = np.where(moved == 0.0, 0.0, moved / np.sqrt(variance))
+            return float(sigmas.max()) if np.isfinite(sigmas).all() and np.isfinite(self.dx).all() else np.inf
+
+    def change(self) -> float:
+        """What the step changes in all measurements, in units of their noise, as a length."""
+        dx = np.repeat(self.dx, np.diff(self.inputs.first_row), axis=0)
+        moved = (self.H @ dx[:, :, None])[:, :, 0]
+        return float(np.linalg.norm(np.where(np.isnan(self.nu), 0.0, moved)))
+
+    def cost_rounding(self) -> float:
+        """How much of the cost may be rounding of the states."""
+        x = np.repeat(np.abs(self.x), np.diff(self.inputs.first_row), axis=0)
+        with np.errstate(all="ignore"):
+            return float(np.nansum(np.abs(self.nu) * (np.abs(self.H) @ (ROUNDING * x)[:, :, None])[:, :, 0]))
 
     def innovations(self) -> tuple[Array, Array]:
         """Innovations and their covariances along the final linearisation, (J, m) and (J, m, m)."""
@@ -136,6 +154,15 @@ class Solver(Protocol):
 
     name: str
 
+    def begin(self, states: Array) -> Array:
+        """The states (K, n) to start from, as this solver can take them."""
+
+    def moved(self, states: Array, step: Array) -> Array:
+        """The states after a step, (K, n)."""
+
+    def widest(self) -> float:
+        """Largest predicted variance of a measurement in units of its noise, after a solve."""
+
     def solve(self, damping: float) -> None:
         """Leave the Gauss-Newton (or damped) step in the chain's `dx`."""
 
@@ -153,13 +180,26 @@ class CovarianceSolver:
 
     def __init__(self, chain: Chain) -> None:
         self.chain = chain
+        model = chain.problem.model
+        self.kernels = kernels.load(solve_spec(model.n, model.width, chain.problem.noise_varies))
         rows = int(np.diff(chain.inputs.first_row).max()) * chain.problem.model.width + chain.problem.model.n
         N = chain.problem.model.n
         self.gains, self.P_last = np.empty((rows, N + 1)), np.empty((N, N))
 
+    def begin(self, states: Array) -> Array:
+        return states
+
+    def moved(self, states: Array, step: Array) -> Array:
+        return states + step
+
+    def widest(self) -> float:
+        c, i = self.chain, self.chain.inputs
+        self.kernels.graph_probe(i.epochs, i.first_row, c.nu, c.H, c.P_pred, c.report)
+        return float(c.report[WIDEST])
+
     def solve(self, damping: float) -> None:
         c, i, p = self.chain, self.chain.inputs, self.chain.problem
-        c.solving.graph_solve(
+        self.kernels.graph_solve(
             i.epochs,
             i.scale,
             i.first_row,
@@ -195,7 +235,7 @@ class CovarianceSolver:
     def _marginals(self, cross: Array, keep_cross: bool) -> Array:
         c, i, N = self.chain, self.chain.inputs, self.chain.problem.model.n
         covariance = np.empty((i.epochs, N, N))
-        c.solving.graph_marginals(
+        self.kernels.graph_marginals(
             i.epochs,
             i.scale,
             i.first_row,
@@ -215,68 +255,3 @@ class CovarianceSolver:
             c.report,
         )
         return covariance
-
-
-class InformationSolver:
-    """Square-root information filter forward, means and covariances back: for priors too wide for covariances."""
-
-    name = "square-root information"
-
-    def __init__(self, chain: Chain) -> None:
-        self.chain = chain
-        K, N = chain.inputs.epochs, chain.problem.model.n
-        fragments = chain_fragments(chain.problem, "graph_linearize", "information", "graph_information")
-        self.library = kernels.load(chain.problem.spec(*fragments, lanes=machine_lanes()))
-        self.root = np.ascontiguousarray(np.linalg.solve(np.linalg.cholesky(chain.problem.covariance), np.eye(N)))
-        square, vector = (N, N), (N,)
-        shapes = (square, vector, vector, square, vector, square, vector, square, vector, square, (2 * N, 2 * N + 1), square)
-        self.space = tuple(np.empty(shape) for shape in shapes)
-        self.noise = (np.empty((K, N, N)), np.empty((K, N)), np.empty((K, N, N)))
-        self.covariance = np.empty((K, N, N))
-
-    @staticmethod
-    def applies(problem: Problem) -> bool:
-        """Whether the prior has an inverse: a value known for certain has infinite information."""
-        sigma = np.sqrt(np.diag(problem.covariance))
-        return bool(sigma.min() > 0 and np.linalg.eigvalsh(problem.covariance / np.outer(sigma, sigma)).min() > 1e-13)
-
-    def solve(self, damping: float) -> None:
-        self._solve(damping, np.empty((1, 1)), keep_cross=False)
-
-    def _solve(self, damping: float, cross: Array, keep_cross: bool) -> None:
-        c, i, p = self.chain, self.chain.inputs, self.chain.problem
-        self.library.graph_solve_information(
-            i.epochs,
-            i.scale,
-            i.first_row,
-            p.process_noise.covariance,
-            p.mean,
-            self.root,
-            c.x,
-            c.f,
-            c.Phi,
-            c.Q_all,
-            c.nu,
-            c.H,
-            c.tether,
-            float(damping),
-            *self.space,
-            *self.noise,
-            c.d_pred,
-            c.P_pred,
-            c.multiplier,
-            c.dx,
-            self.covariance,
-            int(keep_cross),
-            cross,
-            c.report,
-        )
-
-    def marginals(self) -> Array:
-        return self.covariance.copy()
-
-    def cross(self) -> Array:
-        N = self.chain.problem.model.n
-        out = np.empty((self.chain.inputs.epochs - 1, N, N))
-        self._solve(0.0, out, keep_cross=True)
-        return out

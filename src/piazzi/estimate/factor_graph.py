@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 
 from piazzi.estimate.bank import Bank, search
-from piazzi.estimate.chain import Chain, CovarianceSolver, InformationSolver, Solver
+from piazzi.estimate.bordered import BorderedSolver
+from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
+from piazzi.estimate.considered import with_considered
+from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome
 from piazzi.estimate.inputs import Inputs, prepare, with_prior_node
@@ -22,12 +25,12 @@ from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
 
 STARTS = ("ekf", "prior", "window", "bank")
-SOLVERS = ("auto", "chain", "information")
+SOLVERS = ("auto", "chain", "bordered")
 # predicted over noise variance of one measurement beyond which a covariance keeps less than six digits of what is left
 DIFFUSE = 1e10
 # iterations that a second solution may take before the first is kept
 CHALLENGE = 20
-CERTAIN = "the information form does not apply, because the prior is certain about some value or combination of values"
+RESTLESS = "the bordered form does not apply, because process noise moves an estimated constant"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +48,10 @@ class FactorGraph:
         Converged when no state moves by more than this many of its standard deviations.
     cross_covariances : bool
         Keep Cov(x[k], x[k+1]) as ``details["cross_covariances"]``, shape (K - 1, n, n).
-    solver : "auto", "chain" or "information"
-        Covariances, or their square-root information for priors more than about a million times as wide as what the
-        measurements leave; "auto" decides, and ``details["solver"]`` tells.
+    solver : "auto", "chain" or "bordered"
+        Covariances throughout, or the first state and the estimated constants beside the chain by column-scaled QR: for
+        constants, and for priors about a million times as wide as what the measurements leave, where covariances lose what
+        they hold.  "auto" decides, and ``details["solver"]`` tells.
 
     Notes
     -----
@@ -80,6 +84,7 @@ class FactorGraph:
         if not self.tolerance > 0:
             raise ValueError(f"tolerance is {self.tolerance}; it must be positive")
 
+    @with_considered
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Smoothed means and covariances at every epoch; `success` is False where the iterations do not converge.
 
@@ -97,9 +102,10 @@ class FactorGraph:
         if self._bank is not None:
             outcome = search(self._bank, chain, solver, inputs, outcome, self.tolerance)
         nu, S = chain.innovations()
-        details = outcome.details | {"start": used}
+        details = outcome.details | {"start": used, "first_state": chain.x[0].copy()}
         if isinstance(chain, RobustChain):
             details |= {"loss": str(self.loss), "weights": chain.weights}
+        failure = outcome.failure or undetermined(problem, outcome.covariance[0], chain.x)
         if self.cross_covariances and not outcome.failure:
             details["cross_covariances"] = solver.cross()[skip:]
         return Estimate(
@@ -114,7 +120,7 @@ class FactorGraph:
             "delayed",
             None,
             details,
-            outcome.failure,
+            failure,
         )
 
     @property
@@ -126,15 +132,18 @@ class FactorGraph:
     def _optimize(self, chain: Chain, inputs: Inputs, tracking: Tracking) -> tuple[Outcome, Solver, str]:
         """Optimise from the start asked for; the outcome, its solver, and the starts used.
 
-        Where the iterations fail, once more from a window, then from the prior.  Where the prior turns out too wide for
-        covariances, in information form, and from the prior first: a filter cannot have worked.  Where the filter behind the
-        start was wrong about its errors, from the prior too: it may have led to another solution of the same measurements.
+        Where the iterations fail, once more from a window, then from the prior.  Where the prior turns out too wide for a
+        filter, in bordered form and from the prior first.  Where the filter behind the start was wrong about its errors, from
+        the prior too: it may have led to another solution of the same measurements.
         """
-        if self.solver == "information" and not InformationSolver.applies(chain.problem):
-            raise ValueError(f"solver 'information' cannot be used: {CERTAIN}")
-        information, name = self.solver == "information", self.start if isinstance(self.start, str) else "given"
+        problem, name = chain.problem, self.start if isinstance(self.start, str) else "given"
         name = name if self._bank is None else "ekf"
-        solver: Solver = InformationSolver(chain) if information else CovarianceSolver(chain)
+        applies = BorderedSolver.applies(problem)
+        if self.solver == "bordered" and not applies:
+            raise ValueError(f"solver 'bordered' cannot be used: {RESTLESS}")
+        bordered = self.solver == "bordered" or (self.solver == "auto" and applies and bool(problem.model.constants))
+        solver: Solver = BorderedSolver(chain) if bordered else CovarianceSolver(chain)
+        wide = False
         waiting = [name, *(s for s in ("window", "prior") if s != name)]
         tried: list[tuple[str, Outcome]] = []
         doubtful = False
@@ -148,13 +157,13 @@ class FactorGraph:
                 with_first(chain, states),
                 self.max_iterations,
                 self.tolerance,
-                np.inf if information else DIFFUSE,
+                np.inf if wide else DIFFUSE,
             )
             tried.append((start, outcome))
             if outcome.failure == TOO_WIDE:
-                if self.solver == "chain" or not InformationSolver.applies(chain.problem):
+                if self.solver == "chain" or not applies:
                     return _too_wide(outcome, self.solver), solver, start
-                solver, information, tried = InformationSolver(chain), True, []
+                solver, wide, tried = solver if bordered else BorderedSolver(chain), True, []
                 waiting = [*(["given"] if name == "given" else []), "prior", "window"]
         outcome, used = _together(tried), ", then ".join(start for start, _ in tried)
         for start in self._others(chain, doubtful, tried[-1][0]) if not outcome.failure else ():
@@ -220,7 +229,7 @@ def _together(tried: list[tuple[str, Outcome]]) -> Outcome:
 
 def _too_wide(outcome: Outcome, solver: str) -> Outcome:
     """The outcome for a prior too wide for covariances where they must be used."""
-    way = "choose solver='auto'" if solver == "chain" else CERTAIN
+    way = "choose solver='auto'" if solver == "chain" else RESTLESS
     return replace(outcome, failure=f"{TOO_WIDE} beside the noise of the measurements: {way}")
 
 

@@ -12,6 +12,7 @@ from piazzi.problem.checks import Array
 
 TOO_WIDE = "the prior is too wide for covariances"
 FIRST_DAMPING, LARGEST_DAMPING = 1e-4, 1e12
+NEARLY = 1e-3  # of a standard deviation: steps below that no longer shrink are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,28 +30,33 @@ def optimize(
 ) -> Outcome:
     """Iterate from the states `start` until no state and no measurement moves by more than `tolerance` standard deviations.
 
-    Measurements count too because a combination of states can be known much better than each of them.
+    Measurements count too because a combination of states can be known much better than each of them.  Steps below a
+    thousandth of a standard deviation that no longer shrink are rounding of the states, and end the iterations as well.
     A step that raises the merit is damped as much as it takes (Levenberg-Marquardt, scaled by the prior), except the first.
     The merit is the cost, and for directions without noise, where the dynamics must hold, twice the defect at the price of
     its multiplier (an exact penalty: Nocedal and Wright 2006, eq. 15.24).  Ends at once, with the failure `TOO_WIDE`, where
     a predicted measurement has more than `widest` times the variance of its noise.
     """
+    start = solver.begin(start)
     chain.x[:] = start
     if not np.isfinite(start).all():
         return _without_start(chain)
     cost, damping, failure = chain.linearize(), 0.0, f"not converged after {max_iterations} iterations"
-    costs, covariance, iteration = [cost], None, 0
+    costs, covariance, iteration, before = [cost], None, 0, np.inf
     for iteration in range(1, max_iterations + 1):
         solver.solve(damping)
-        if iteration == 1 and widest < np.inf and not chain.widest() <= widest:
+        if iteration == 1 and widest < np.inf and not solver.widest() <= widest:
             return Outcome(chain.P_pred, iteration, TOO_WIDE, _figures(chain, solver, costs))
-        if damping == 0.0 and max(chain.report[STEP], np.sqrt(chain.report[GRADIENT])) <= tolerance and np.isfinite(cost):
+        size = _size(chain)
+        at_rounding = NEARLY > size > 0.5 * before and not chain.reweighted
+        if damping == 0.0 and np.isfinite(cost) and (size <= tolerance or at_rounding):
             covariance = solver.marginals()
-            if chain.report[STEP_SMOOTHED] <= tolerance:
-                chain.x += chain.dx
+            if chain.report[STEP_SMOOTHED] <= (NEARLY if at_rounding else tolerance):
+                chain.x[:] = solver.moved(chain.x, chain.dx)
                 failure = ""
                 break
             covariance = None
+        before = size
         accepted, cost, damping = _step(chain, solver, cost, damping, gated=iteration > 1)
         costs.append(cost)
         if not accepted:
@@ -63,6 +69,11 @@ def optimize(
     return Outcome(covariance, iteration, failure, _figures(chain, solver, costs))
 
 
+def _size(chain: Chain) -> float:
+    """The step that was solved for, in standard deviations: the largest of any state, or of the measurements together."""
+    return float(max(chain.report[STEP], np.sqrt(chain.report[GRADIENT])))
+
+
 def _step(chain: Chain, solver: Solver, cost: float, damping: float, gated: bool) -> tuple[bool, float, float]:
     """Take a step that does not raise the merit (not gated: that stays finite).
 
@@ -71,10 +82,10 @@ def _step(chain: Chain, solver: Solver, cost: float, damping: float, gated: bool
     x, broken = chain.x.copy(), chain.broken.copy()
     while True:
         price = np.abs(chain.multiplier)
-        np.add(x, chain.dx, out=chain.x)
+        chain.x[:] = solver.moved(x, chain.dx)
         new = chain.linearize()
         merit, merit_new = _merit(cost, price, broken), _merit(new, price, chain.broken)
-        if np.isfinite(merit_new) and (not gated or merit_new <= merit + 1e-9 * (1.0 + abs(merit))):
+        if np.isfinite(merit_new) and (not gated or _lower(chain, merit_new, merit)):
             return True, new, 0.0 if damping <= FIRST_DAMPING else damping / 10.0
         damping = max(10.0 * damping, FIRST_DAMPING)
         chain.x[:] = x
@@ -82,6 +93,12 @@ def _step(chain: Chain, solver: Solver, cost: float, damping: float, gated: bool
         if damping > LARGEST_DAMPING:
             return False, cost, damping
         solver.solve(damping)
+
+
+def _lower(chain: Chain, merit_new: float, merit: float) -> bool:
+    """Whether the merit did not rise, up to rounding."""
+    allowed = merit + 1e-9 * (1.0 + abs(merit))
+    return merit_new <= allowed or (merit_new <= allowed + 1e-3 * abs(merit) and merit_new <= allowed + chain.cost_rounding())
 
 
 def _merit(cost: float, price: Array, broken: Array) -> float:

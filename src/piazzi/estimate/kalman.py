@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from piazzi import kernels
+from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.guarded import Guard, GuardedLiveFilter, check_gate, guarded_run
 from piazzi.estimate.inputs import Inputs, prepare, scratch
@@ -67,6 +68,7 @@ class ExtendedKalmanFilter:
         """What goes beyond the plain filter, None where nothing does."""
         return None if self.iterations == 1 and self.gate is None else Guard(int(self.iterations), self.gate)
 
+    @with_considered
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Filtered means and covariances at every epoch.
 

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from piazzi import kernels
+from piazzi.estimate.considered import considered_names
 from piazzi.estimate.inputs import scratch
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -18,6 +19,11 @@ class Clock:
     """Where a session stands between epochs: checks that time goes forward, and the length of each step."""
 
     def __init__(self, problem: Problem) -> None:
+        for name in considered_names(problem):
+            raise ValueError(
+                f"parameter {name!r} is considered, which needs the whole run: make it fixed or estimated to go measurement by "
+                "measurement"
+            )
         self.problem = problem
         self.time = problem.prior_time
         self._steps: dict[float, tuple[int, float]] = {}

@@ -151,6 +151,13 @@ ESTIMATORS: Mapping[str, Entry] = {
         ("delayed",),
         _plain,
     ),
+    "batch": Entry(
+        "batch",
+        "batch least squares over the initial state, without process noise",
+        "piazzi.estimate.batch:BatchLeastSquares",
+        ("delayed",),
+        _plain,
+    ),
     "graph": Entry(
         "graph[:ekf|:prior|:window|:bank[=N]][:LOSS[=K]]",
         "factor graph over all states, started from one of these; a LOSS (huber, cauchy, tukey) withstands outliers",

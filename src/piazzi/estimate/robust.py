@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,6 +32,8 @@ class RobustChain(Chain):
     Innovations and Jacobians are scaled by the root of the weight, so that every solver works on them as they are and the
     gradient is that of the robust cost.
     """
+
+    reweighted: ClassVar[bool] = True
 
     def __init__(self, problem: Problem, inputs: Inputs, loss: Loss) -> None:
         super().__init__(problem, inputs)

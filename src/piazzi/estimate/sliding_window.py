@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from piazzi import kernels
+from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.inputs import Inputs, prepare
 from piazzi.estimate.live_window import LiveWindow, window_opens
@@ -66,6 +67,7 @@ class SlidingWindow:
             return np.maximum(newest - (self.lag - 1), 0)
         return np.asarray(np.searchsorted(times, window_opens(times, self.lag_seconds)), dtype=np.int64)
 
+    @with_considered
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Real-time means and covariances at every epoch, with the delayed ones beside them.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.chain import chain_fragments
+from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.inputs import prepare, scratch
 from piazzi.estimate.kalman import check_start
@@ -34,6 +35,7 @@ class Smoother:
 
     cross_covariances: bool = False
 
+    @with_considered
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Smoothed means and covariances at every epoch; innovations are the filter's.
 

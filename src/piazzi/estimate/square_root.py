@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.guarded import check_gate
 from piazzi.estimate.live_root import LiveRootFilter
@@ -32,6 +33,7 @@ class SquareRootKalmanFilter:
     def __post_init__(self) -> None:
         check_gate(self.gate)
 
+    @with_considered
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Filtered means and covariances at every epoch.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite, sqrt
 
+from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.guarded import check_gate
 from piazzi.estimate.live_root import LiveRootFilter
@@ -52,6 +53,7 @@ class UnscentedKalmanFilter:
             raise ValueError(f"kappa is {self.kappa}; it must be finite, usually 0 or 3 - n")
         check_gate(self.gate)
 
+    @with_considered
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Filtered means and covariances at every epoch.
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from piazzi.estimate.chain import Chain, CovarianceSolver, InformationSolver, Solver
+from piazzi.estimate.bordered import BorderedSolver
+from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
 from piazzi.estimate.factor_graph import DIFFUSE, with_first
 from piazzi.estimate.inputs import prepare, with_prior_node
 from piazzi.problem import Problem, Tracking
@@ -90,10 +91,11 @@ def linearized(problem: Problem, tracking: Tracking, states: Array) -> Linearize
     chain.x[:] = with_first(chain, states)
     with np.errstate(all="ignore"):
         chain.linearize()
-        solver: Solver = CovarianceSolver(chain)
+        bordered = BorderedSolver.applies(problem) and bool(problem.model.constants)
+        solver: Solver = BorderedSolver(chain) if bordered else CovarianceSolver(chain)
         solver.solve(0.0)
-        if not chain.widest() <= DIFFUSE and InformationSolver.applies(problem):
-            solver = InformationSolver(chain)
+        if not bordered and not solver.widest() <= DIFFUSE and BorderedSolver.applies(problem):
+            solver = BorderedSolver(chain)
             solver.solve(0.0)
         smoothed, cross = solver.marginals(), solver.cross()
         rows = np.diff(inputs.first_row)

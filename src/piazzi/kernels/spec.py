@@ -72,7 +72,7 @@ def _fragment(name: str) -> str:
 def _surroundings() -> tuple[str, ...]:
     """Versions, processor and the text of every file that shapes all kernels (Numba does not notice an edited import).
 
-    Fragments are left out: a module depends on its own only.
+    Fragments are left out, because a module depends on its own only, and the vocabulary, which is for readers.
     """
     import platform
     import sys
@@ -82,7 +82,7 @@ def _surroundings() -> tuple[str, ...]:
 
     text = hashlib.sha256()
     for file in sorted(f for stage in ("expressions", "model", "kernels") for f in (HERE.parent / stage).rglob("*.py")):
-        if file.parent.name == "fragments":
+        if file.parent.name == "fragments" or file.name == "vocabulary.py":
             continue
         text.update(file.name.encode() + b"\0" + file.read_bytes())
     features = llvm.get_host_cpu_features().flatten()

@@ -69,13 +69,6 @@ backward: Any
 absorb_epoch: Any
 update_scalar: Any
 factor_noise: Any
-rotate_in: Any
-invert_triangle: Any
-noise_root: Any
-belief: Any
-transposed_lu: Any
-step_information: Any
-back_information: Any
 judge: Any
 surprise: Any
 update_epoch_guarded: Any
@@ -84,3 +77,11 @@ travel_lanes: Any
 transition_lanes: Any
 squared_lanes: Any
 nees_lanes: Any
+# written in fragments/border.py
+rotate: Any
+invert_upper: Any
+begin_border: Any
+advance_border: Any
+absorb_row: Any
+width_of_row: Any
+record_belief: Any

@@ -68,17 +68,19 @@ class Sensor:
     angles : sequence of component names
         Components that are angles in radians: their innovations wrap into (-pi, pi].
     units : mapping of component name to unit, for tables and pictures; angles default to "rad".
+    number_units : mapping of the sensor's own numbers to units, for those that are estimated
 
     Raises
     ------
     ValueError
-        For an equation outside the restricted language, or an unknown component in `angles` or `units`.
+        For an equation outside the restricted language, or an unknown name in `angles`, `units` or `number_units`.
     """
 
     name: str
     equations: Any
     angles: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    number_units: Any = field(default_factory=dict)
     components: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -97,6 +99,10 @@ class Sensor:
             for component in given:
                 if component not in labelled:
                     raise ValueError(f"sensor {self.name!r}: {what} names {component!r}; its components are {known}")
+        for name in dict(self.number_units):
+            if name not in self.free_names:
+                raise ValueError(f"sensor {self.name!r}: number_units names {name!r}, which no equation uses")
+        put(self, "number_units", tuple((str(n), str(u)) for n, u in dict(self.number_units).items()))
         put(self, "units", tuple((c, units.get(c, "rad" if c in self.angles else "")) for c in labelled))
 
     def _labelled(self) -> dict[str, str]:

@@ -67,13 +67,16 @@ class ProcessNoise:
 class Station:
     """A place that measures: a sensor of the model, its noise R (m, m) and the sensor's own numbers.
 
-    `noise` is a full covariance matrix, a diagonal, or one variance; SI units and radians.
+    `noise` is a full covariance matrix, a diagonal, or one variance; SI units and radians.  A number that is not known for
+    certain is a ``Gaussian(mean, variance)``: it is estimated with the states, under its own name and the station's
+    (``bias`` of station ``north`` is ``bias_north``), or, where `considered` names it, inflates the covariance only.
     """
 
     name: str
     sensor: str
     noise: Any
-    numbers: Mapping[str, float] = field(default_factory=dict)
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    considered: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from piazzi.model import Model, nearest
 from piazzi.problem import functions, manoeuvres
 from piazzi.problem.checks import Array, covariance, finite_vector, frozen, numeric
 from piazzi.problem.composition import composed
+from piazzi.problem.constants import with_station_constants
 from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
 from piazzi.problem.two_body import check_orbit_axes, check_two_body
 
@@ -32,7 +33,7 @@ class Problem:
     process_noise : ProcessNoise, or a matrix (a density per second, integrated), or None for none
     stations : sequence of Station
     parameters : mapping of name to number
-        An estimated or considered constant takes a `Gaussian`, ``Gaussian(mean, variance)``.
+        An estimated or considered constant takes a `Gaussian`, ``Gaussian(mean, variance)``.  So may a number of a station.
     integrator : Integrator
         Default `RungeKutta4()`, ten substeps per interval; `Discrete()` for a model that is a step.
     prior_time : float, optional
@@ -62,6 +63,11 @@ class Problem:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
+        given = [self.stations] if isinstance(self.stations, Station) else list(self.stations)
+        model, stations, parameters = with_station_constants(self.model, given, self.parameters)
+        put(self, "model", model)
+        put(self, "stations", stations)
+        put(self, "parameters", parameters)
         put(self, "process_noise", self._noise(self.process_noise))
         put(self, "stations", self._stations())
         put(self, "parameters", self._parameters())
@@ -97,7 +103,7 @@ class Problem:
 
     def _stations(self) -> tuple[Station, ...]:
         out: list[Station] = []
-        for station in [self.stations] if isinstance(self.stations, Station) else self.stations:
+        for station in self.stations:
             sensor = self.model.sensor(station.sensor)
             if any(station.name == other.name for other in out):
                 raise ValueError(f"two stations are called {station.name!r}")
@@ -231,13 +237,18 @@ class Problem:
 
     @property
     def noise_fragment(self) -> str:
-        return "noise_integral" if self.process_noise.is_integral else "noise_scaled"
+        return "noise_integral" if self._integrated else "noise_scaled"
+
+    @cached_property
+    def _integrated(self) -> bool:
+        """Whether noise is integrated along each step: where there is none, there is nothing to integrate."""
+        return self.process_noise.is_integral and bool(self.process_noise.covariance.any())
 
     @property
     def noise_varies(self) -> bool:
         """Whether the noise of an interval depends on the states, so that it is not a multiple of one matrix."""
-        noise = self.process_noise
-        return noise.is_integral or noise.axes != "states" or any(m.covariance.any() for m in self.manoeuvres)
+        moved = self.process_noise.axes != "states" and bool(self.process_noise.covariance.any())
+        return self._integrated or moved or any(m.covariance.any() for m in self.manoeuvres)
 
     def intervals(self, times: Array) -> tuple[float, Array, Array]:
         """Time of the prior, and for each epoch the substeps and the noise scale of the interval that ends there."""

@@ -205,7 +205,10 @@ def _sensor(name: str, table: Table, units: Units, out: Physics) -> Sensor | Non
     table.finish()
     out.components[name], out.numbers[name] = kinds, numbers
     with table.faults.at(table.path):
-        sensor = Sensor(name, equations, tuple(angles), {k: u.label for k, u in kinds.items() if u.label})
+        labels = {k: u.label for k, u in kinds.items() if u.label}
+        used = Sensor(name, equations, tuple(angles), labels).free_names
+        own = {k: u.label for k, u in numbers.items() if u.label and k in used}
+        sensor = Sensor(name, equations, tuple(angles), labels, own)
         for unused in sorted(numbers.keys() - sensor.free_names):
             table.fault("numbers", f"names {unused!r}, which no equation uses{nearest(unused, sorted(sensor.free_names))}")
         return sensor

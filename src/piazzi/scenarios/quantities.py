@@ -10,6 +10,7 @@ import numpy as np
 from piazzi.model import Model
 from piazzi.problem import Gaussian, ProcessNoise, Station
 from piazzi.problem.checks import Array, covariance
+from piazzi.problem.constants import constant_name
 from piazzi.scenarios.equations import Physics
 from piazzi.scenarios.faults import shown
 from piazzi.scenarios.table import Table
@@ -110,7 +111,10 @@ def read_station(table: Table, physics: Physics) -> Station | None:
         noise.finish(SPREADS)
     before = len(table.faults)
     given = table.table("numbers")
-    numbers = {key: given.number(key, own.get(key, ONE).factor) for key in own}
+    considered: list[str] = []
+    numbers = {key: _own_number(key, given, own[key].factor, considered) for key in own}
+    uncertain = [key for key, value in numbers.items() if isinstance(value, Gaussian)]
+    physics.units |= {constant_name(key, name): own[key] for key in uncertain if name}
     for key in own:
         if key not in given:
             table.fault("numbers", f"has no value for {key!r}, which sensor {sensor!r} uses")
@@ -118,7 +122,23 @@ def read_station(table: Table, physics: Physics) -> Station | None:
     table.finish()
     if R is None or not name or len(table.faults) > before:
         return None
-    return Station(name, sensor, R, {k: v for k, v in numbers.items() if v is not None})
+    return Station(name, sensor, R, {k: v for k, v in numbers.items() if v is not None}, considered)
+
+
+def _own_number(name: str, table: Table, factor: float, considered: list[str]) -> Any:
+    """A station's number, or a Gaussian for one that is estimated or, noted in `considered`, considered."""
+    if not isinstance(table.raw(name), Mapping):
+        return table.number(name, factor)
+    inner = table.table(name)
+    value = inner.number("value", factor)
+    if "value" not in inner:
+        inner.fault("value", "is missing")
+    role = inner.text("role", "estimated", ("estimated", "considered"))
+    P = read_spread(inner, [name], [factor])
+    inner.finish(("role", *SPREADS[:2]))
+    if role == "considered":
+        considered.append(name)
+    return None if value is None or P is None else Gaussian([value], P)
 
 
 def read_stations(file: Table, physics: Physics) -> list[Station | None]:

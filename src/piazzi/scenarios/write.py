@@ -73,7 +73,7 @@ def _equations(model: Model) -> dict[str, Any]:
 def _sensor(model: Model, sensor: Sensor) -> dict[str, Any]:
     rows = zip(sensor.components, sensor.equations, sensor.is_angle, dict(sensor.units).values(), strict=True)
     return {
-        "numbers": dict.fromkeys(model.numbers(sensor), ""),
+        "numbers": dict.fromkeys(model.numbers(sensor), "") | dict(sensor.number_units),
         "components": {c: {"equation": e, "unit": unit, "angle": angle} for c, e, angle, unit in rows},
     }
 

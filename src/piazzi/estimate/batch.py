@@ -1,0 +1,142 @@
+"""Batch least squares: the initial state and the constants that fit all measurements, without process noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from piazzi import kernels
+from piazzi.estimate.bordered import BorderedSolver
+from piazzi.estimate.chain import Chain
+from piazzi.estimate.considered import with_considered
+from piazzi.estimate.determined import undetermined
+from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.factor_graph import FactorGraph
+from piazzi.estimate.gauss_newton import Outcome, optimize
+from piazzi.estimate.inputs import prepare, with_prior_node
+from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.problem import Problem, Tracking
+from piazzi.problem.checks import Array, numeric
+
+PATIENCE = 15  # iterations from the prior before the graph is asked; where it converges at all, half of them suffice
+
+
+class ShootingSolver(BorderedSolver):
+    """The bordered solver for orbits that hold the dynamics throughout: only their first state and the constants move."""
+
+    name = "batch"
+
+    def __init__(self, chain: Chain) -> None:
+        super().__init__(chain)
+        i, self.x = chain.inputs, np.empty_like(chain.x)
+        library = kernels.load(chain.problem.spec("transition", "propagate"))
+        self._propagate: Callable[[], None] = library.run_propagation.bind(i.epochs, i.t, i.count, chain.problem.given, self.x)
+
+    def begin(self, states: Array) -> Array:
+        return self._orbit(states[0])
+
+    def moved(self, states: Array, step: Array) -> Array:
+        return self._orbit(states[0] + step[0])
+
+    def _orbit(self, first: Array) -> Array:
+        """States at all nodes (K, n) of the orbit from `first`."""
+        self.x[0] = first
+        self._propagate()
+        return self.x.copy()
+
+
+@dataclass(frozen=True, eq=False)
+class BatchLeastSquares:
+    """Classical differential correction of the initial state and the estimated constants, with their prior.
+
+    Parameters
+    ----------
+    start : (n,) or None
+        First state and constants to start from, at the time of the prior; default the prior's mean.
+    max_iterations : int
+    tolerance : float
+        Converged when no state moves by more than this many of its standard deviations.
+
+    Notes
+    -----
+    Tapley, Schutz and Born, Statistical Orbit Determination (2004), ch. 4.  The dynamics are taken as exact: process noise
+    and the errors of manoeuvres are left out.  The normal equations are never formed: the measurements are rotated into a
+    triangle, column by column in units of the prior (Bierman 1977).  Where the iterations do not converge from the prior,
+    they are continued from the full graph of the same problem, which needs no good start; ``details["start"]`` tells.
+    """
+
+    start: Any = None
+    max_iterations: int = 50
+    tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        if self.max_iterations < 1:
+            raise ValueError(f"max_iterations is {self.max_iterations}; it must be 1 or more")
+        if not self.tolerance > 0:
+            raise ValueError(f"tolerance is {self.tolerance}; it must be positive")
+
+    @with_considered
+    def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
+        """Means and covariances at every epoch; `success` is False where the iterations do not converge.
+
+        Raises
+        ------
+        ValueError
+            Where the tracking does not fit the problem, or the start has the wrong shape.
+        """
+        calm = undisturbed(problem)
+        inputs = prepare(calm, tracking)
+        nodes = with_prior_node(inputs)
+        skip = nodes.epochs - inputs.epochs
+        watch = Stopwatch()
+        chain = Chain(calm, nodes)
+        solver = ShootingSolver(chain)
+        outcome, used = self._optimize(chain, solver, calm, tracking)
+        nu, S = chain.innovations()
+        return Estimate(
+            problem,
+            tracking,
+            chain.x[skip:],
+            outcome.covariance[skip:],
+            nu,
+            S,
+            outcome.iterations,
+            watch.seconds(),
+            "delayed",
+            None,
+            outcome.details | {"start": used},
+            outcome.failure or undetermined(calm, outcome.covariance[0], chain.x),
+        )
+
+    def _optimize(self, chain: Chain, solver: ShootingSolver, calm: Problem, tracking: Tracking) -> tuple[Outcome, str]:
+        """Optimise from the start, and where that fails from the full graph."""
+        first = self._first(calm)
+        used = "prior" if self.start is None else "given"
+        patience = self.max_iterations if self.start is not None else min(self.max_iterations, PATIENCE)
+        outcome = optimize(chain, solver, np.broadcast_to(first, chain.x.shape), patience, self.tolerance)
+        if not outcome.failure:
+            return outcome, used
+        graph = FactorGraph().estimate(calm, tracking)
+        if not graph.success:
+            return outcome, used
+        states = graph.details["first_state"]
+        again = optimize(chain, solver, np.broadcast_to(states, chain.x.shape), self.max_iterations, self.tolerance)
+        return replace(again, iterations=outcome.iterations + graph.iterations + again.iterations), f"{used}, then graph"
+
+    def _first(self, problem: Problem) -> Array:
+        if self.start is None:
+            return problem.mean
+        first = numeric(self.start, "start").reshape(-1)
+        if first.shape != (problem.model.n,) or not np.isfinite(first).all():
+            names = ", ".join(problem.model.names)
+            raise ValueError(f"start has shape {np.shape(self.start)}; it must be ({problem.model.n},) ({names}), and finite")
+        return first
+
+
+def undisturbed(problem: Problem) -> Problem:
+    """The problem with exact dynamics: no process noise, and manoeuvres as commanded."""
+    noise = replace(problem.process_noise, covariance=np.zeros_like(problem.process_noise.covariance))
+    return replace(problem, process_noise=noise, manoeuvres=[replace(m, covariance=None) for m in problem.manoeuvres])

@@ -1,0 +1,69 @@
+"""Parameters that are uncertain but not estimated: what they do to the covariance of any estimator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
+from typing import Any, TypeVar
+
+import numpy as np
+
+from piazzi.estimate.estimator import Estimate
+from piazzi.problem import Gaussian, Problem, Tracking
+
+STEP = 0.1  # of a parameter's sigma, to either side: small beside what bends, large beside rounding
+_Estimator = TypeVar("_Estimator")
+Run = Callable[[_Estimator, Problem, Tracking], Estimate]
+
+
+def considered_names(problem: Problem) -> tuple[str, ...]:
+    """Names of the parameters that are considered and uncertain."""
+    names = (p.name for p in problem.model.parameters if p.role == "considered")
+    return tuple(n for n in names if problem.parameters[n].covariance[0, 0] > 0)
+
+
+def with_considered(run: Run[_Estimator]) -> Run[_Estimator]:
+    """An estimator's `estimate` that accounts for considered parameters.
+
+    The estimate is the one for their nominal values.  Its covariance gains s s^T for each, with s the change of the estimate
+    by one standard deviation of the parameter (Tapley, Schutz and Born 2004, ch. 6): the derivative of the estimator itself,
+    by central differences, so that it holds for filters, windows and graphs alike.  The covariances of the innovations gain
+    theirs.  ``details["considered_mu"]`` is s (K, n) for a parameter ``mu``.
+    """
+
+    @wraps(run)
+    def estimate(self: _Estimator, problem: Problem, tracking: Tracking) -> Estimate:
+        names = considered_names(problem)
+        nominal = run(self, problem, tracking)
+        for name in names if nominal.success else ():
+            sides = [run(self, _moved(problem, name, side * STEP), tracking) for side in (1.0, -1.0)]
+            nominal = _inflated(nominal, name, *sides)
+        return nominal
+
+    return estimate
+
+
+def _moved(problem: Problem, name: str, sigmas: float) -> Problem:
+    """The problem with another value of a considered parameter."""
+    given = problem.parameters[name]
+    value = given.mean[0] + sigmas * np.sqrt(given.covariance[0, 0])
+    return replace(problem, parameters={**problem.parameters, name: Gaussian(value, given.covariance)})
+
+
+def _inflated(nominal: Estimate, name: str, above: Estimate, below: Estimate) -> Estimate:
+    """The estimate with the part of one parameter added to its covariances."""
+    for side in (above, below):
+        if not side.success:
+            return replace(nominal, failure=f"with the considered parameter {name!r} moved by {STEP:g} sigma: {side.message}")
+    s = (above.mean - below.mean) / (2 * STEP)
+    e = (above.innovations - below.innovations) / (2 * STEP)
+    changes: dict[str, Any] = {
+        "covariance": nominal.covariance + s[:, :, None] * s[:, None, :],
+        "innovation_covariances": nominal.innovation_covariances + e[:, :, None] * e[:, None, :],
+        "seconds": nominal.seconds + above.seconds + below.seconds,
+        "details": {**nominal.details, f"considered_{name}": s},
+    }
+    if nominal.delayed is not None and above.delayed is not None and below.delayed is not None:
+        changes["delayed"] = _inflated(nominal.delayed, name, above.delayed, below.delayed)
+    return replace(nominal, **changes)

@@ -1,0 +1,55 @@
+"""Whether the measurements say anything about each direction that the prior left open."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+
+OPEN = 1e3  # times the size of a value: a prior that wide says that it is not known
+UNTOUCHED = 0.9  # of the prior's variance: the measurements said nothing
+
+
+def undetermined(problem: Problem, first: Array, states: Array) -> str:
+    """A line naming the direction that a wide prior left open and the measurements did not close, "" if there is none.
+
+    Parameters
+    ----------
+    problem : Problem
+    first : (n, n), covariance of the first state given all measurements
+    states : (K, n), estimates, which tell how large each value (each group, as a vector) is
+    """
+    sigma = np.sqrt(np.diag(problem.covariance))
+    size = _sizes(problem, states)
+    wide = sigma > OPEN * size
+    if not wide.any():
+        return ""
+    unit = np.where(sigma > 0, sigma, 1.0)
+    values, vectors = np.linalg.eigh(first / np.outer(unit, unit))
+    direction = vectors[:, -1]
+    main = int(np.argmax(np.abs(direction)))
+    if not (values[-1] > UNTOUCHED and wide[main]):
+        return ""
+    return f"the measurements do not determine {_words(problem, direction)}: it is as uncertain as the prior left it"
+
+
+def _sizes(problem: Problem, states: Array) -> Array:
+    """How large each value is along the way: its own absolute value, or the length of the group that it belongs to."""
+    with np.errstate(over="ignore"):
+        size = np.abs(states).max(axis=0)
+        for members in problem.model.group_indices.values():
+            columns = list(members)
+            size[columns] = np.maximum(size[columns], np.sqrt((states[:, columns] ** 2).sum(axis=1)).max())
+    return np.where(size > 0, size, max(float(size.max()), 1.0))
+
+
+def _words(problem: Problem, direction: Array) -> str:
+    """A direction in the names of its states, in units of their prior sigma, the largest first."""
+    order = [int(i) for i in np.argsort(-np.abs(direction)) if abs(direction[i]) > 0.1]
+    names = problem.model.names
+    if len(order) == 1:
+        return repr(names[order[0]])
+    sign = np.sign(direction[order[0]])
+    terms = " ".join(f"{sign * direction[i]:+.2f} {names[i]}" for i in order)
+    return f"the combination {terms} (in prior sigmas)"

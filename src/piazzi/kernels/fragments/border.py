@@ -1,0 +1,131 @@
+"""Unknowns that all states share, beside the chain: its first state and the constants.
+
+A chain whose first state and constants are given is solved without their priors, however wide these are.  What is predicted
+depends on the unknowns linearly: deviation k is d_k + S_k b, with b of unit prior (Friedland 1969, separate-bias estimation).
+Every innovation of the chain, in units of its deviation, is then one equation for b, and these are rotated into a triangle
+(Bierman 1977, ch. 4): nothing is squared, and columns of any scale keep their digits.
+"""
+
+from piazzi.kernels.vocabulary import *  # noqa: F403
+
+
+@inline
+def rotate(R, y, row, value, size):
+    """Rotate the equation ``row . b = value`` into the triangle ``R b = y``; `row` is used up."""
+    for j in range(size):
+        if row[j] != 0.0:
+            length = sqrt(R[j * size + j] * R[j * size + j] + row[j] * row[j])
+            c = R[j * size + j] / length
+            s = row[j] / length
+            for i in range(j, size):
+                above = R[j * size + i]
+                R[j * size + i] = c * above + s * row[i]
+                row[i] = c * row[i] - s * above
+            above = y[j]
+            y[j] = c * above + s * value
+            value = c * value - s * above
+
+
+@inline
+def invert_upper(R, out, size):
+    """The inverse of the upper triangle, into `out`."""
+    for c in range(size):
+        for b in range(size):
+            i = size - 1 - b
+            s = 1.0 if i == c else 0.0
+            for k in range(i + 1, size):
+                s -= R[i * size + k] * out[k * size + c]
+            out[i * size + c] = s / R[i * size + i]
+
+
+@inline
+def begin_border(C, root, R, y, S):
+    """The unknowns' prior: no deviation, unit variance; the first state through the rows of `root`, the constants later."""
+    size = N + C
+    for i in range(size):
+        y[i] = 0.0
+        for j in range(size):
+            R[i * size + j] = 1.0 if i == j else 0.0
+        store(S, i * N, load_vector(root, i * N, N) if i < N else unit(-1, N))
+
+
+@inline
+def advance_border(k, C, F, d, c, B, offset, sigma, S):
+    """Deviation and sensitivities of state k from those of state k - 1, whose step has the derivative F by the state."""
+    d = F @ d + c
+    for i in range(C):
+        by_constant = load_vector(B, ((k - 1) * C + i) * N, N)
+        d = d + offset[i] * by_constant
+        store(S, (N + i) * N, sigma[i] * by_constant + F @ load_vector(S, (N + i) * N, N))
+    for j in range(N):
+        store(S, j * N, F @ load_vector(S, j * N, N))
+    return d
+
+
+@inline
+def absorb_row(h, G, at, nu, C, d, P, offset, sigma, R, y, S, row, size):
+    """One measurement of unit noise: the chain's update for given unknowns; its innovation goes into the triangle."""
+    Ph = h @ P
+    variance = h @ Ph + 1.0
+    K = (1.0 / variance) * Ph
+    e = nu - h @ d
+    for i in range(C):
+        e -= G[at + i] * offset[i]
+    weight = 1.0 / sqrt(variance)
+    for j in range(size):
+        s = load_vector(S, j * N, N)
+        effect = h @ s
+        if j >= N and j - N < C:
+            effect += G[at + j - N] * sigma[j - N]
+        store(S, j * N, s - effect * K)
+        row[j] = weight * effect
+    rotate(R, y, row, weight * e, size)
+    B = P - outer(Ph, K)
+    return d + e * K, B + outer(K, K - h @ B)
+
+
+@inline
+def width_of_row(h, G, at, C, P, sigma, S, inverse, row, size):
+    """Predicted variance of a measurement of unit noise, without the noise."""
+    for j in range(size):
+        row[j] = h @ load_vector(S, j * N, N)
+        if j >= N:
+            row[j] = row[j] + G[at + j - N] * sigma[j - N]
+    total = h @ (h @ P)
+    for q in range(size):
+        s = 0.0
+        for j in range(q + 1):
+            s += row[j] * inverse[j * size + q]
+        total += s * s
+    return total
+
+
+@inline
+def record_belief(k, C, d, P, offset, sigma, y, S, inverse, row, W, own, d_pred, P_pred):
+    """Predicted deviation and covariance of states and constants together, unknowns included, at position k."""
+    size = N + C
+    for q in range(size):
+        s = 0.0
+        for j in range(q, size):
+            s += inverse[q * size + j] * y[j]
+        row[q] = s
+    mean = d
+    for j in range(size):
+        mean = mean + row[j] * load_vector(S, j * N, N)
+    store(d_pred, k * size, mean)
+    for i in range(C):
+        d_pred[k * size + N + i] = offset[i] + sigma[i] * row[N + i]
+    for q in range(size):
+        w = unit(-1, N)
+        for j in range(q + 1):
+            w = w + inverse[j * size + q] * load_vector(S, j * N, N)
+        store(W, q * size, w)
+        for i in range(C):
+            W[q * size + N + i] = sigma[i] * inverse[(N + i) * size + q]
+    store(own, 0, P)
+    for i in range(size):
+        for j in range(size):
+            s = own[i * N + j] if i < N and j < N else 0.0
+            for q in range(size):
+                s += W[q * size + i] * W[q * size + j]
+            P_pred[(k * size + i) * size + j] = s
