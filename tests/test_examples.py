@@ -32,6 +32,18 @@ def test_an_example_is_sound_and_its_graph_knows_its_errors(path):
     assert (abs(error) < 5 * sigma).all()  # 5 sigma at every epoch and state: an honest covariance
 
 
+@pytest.mark.slow
+def test_the_founding_papers_figures(data_dir, tmp_path):
+    folder = data_dir / "satellite"
+    script = Path(__file__).resolve().parent.parent / "examples" / "founding_figures.py"
+    made = subprocess.run(
+        [sys.executable, "-W", "error", str(script), str(folder), "-o", str(tmp_path), "--format", "svg"],
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["accuracy_ekf.svg", "accuracy_graph.svg", "timing.svg"]
+
+
 def test_a_newcomers_problem_takes_under_30_lines():
     text = next(path for path in EXAMPLES if path.stem == "falling_probe").read_text()
     assert sum(1 for line in text.splitlines() if line.strip() and not line.startswith("#")) < 30

@@ -9,8 +9,9 @@ from matplotlib.patches import Circle, Ellipse
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.evaluate import Comparison, compare
+from piazzi.evaluate import Comparison, WindowTrade, compare, observability, windows
 from piazzi.present.figures import (
+    bound_sigmas,
     error_overlay,
     innovations,
     measurements,
@@ -20,7 +21,12 @@ from piazzi.present.figures import (
     path_beside_truth,
     position_at,
     residuals,
+    singular_values,
     state_error,
+    timing,
+    window_consistency,
+    window_cost,
+    window_trade,
 )
 from piazzi.present.figures.errors import claim_overlay
 from piazzi.present.figures.pages import pages, save
@@ -213,6 +219,50 @@ def test_a_path_beside_the_truth(ax, ekf):
     path_beside_truth(ax, ekf.mean[:, :2], ekf.tracking.truth[:, :2], name="ekf")
     assert_allclose(ax.lines[1].get_xydata(), ekf.tracking.truth[:, :2])
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "y [m]")
+
+
+# ---- windows and observability -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def trade(comparison) -> WindowTrade:
+    return windows(comparison.problem, comparison.tracking, (1, 5, 20))
+
+
+def test_window_trades_are_drawn_beside_the_graph(ax, trade):
+    window_trade(ax, trade, "position")
+    assert_allclose(ax.lines[0].get_xydata(), np.stack([[1, 5, 20], trade.rmse("position")], axis=1))
+    assert_allclose(ax.lines[1].get_ydata(), trade.rmse("position", "delayed"))
+    assert_allclose(ax.lines[2].get_ydata(), trade.graph.rmse_last_half["position"])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("window length [states]", "position RMSE, last half [m]")
+
+
+def test_consistency_and_cost_of_windows(trade):
+    nees_ax, cost_ax, time_ax = Figure().subplots(1, 3)
+    window_consistency(nees_ax, trade)
+    assert nees_ax.lines[-1].get_ydata()[0] == 4
+    window_cost(cost_ax, trade)
+    assert_allclose(cost_ax.lines[0].get_ydata(), trade.microseconds_per_step)
+    assert cost_ax.get_ylabel() == "time per step [us]"
+    timing(time_ax, np.array([10, 100, 1000]), np.array([1e-3, np.nan, 2.0]))
+    assert (time_ax.get_xlabel(), time_ax.get_ylabel()) == ("length of the run [epochs]", "time [s]")
+
+
+def test_windows_without_truth_have_no_errors_to_draw(ax, comparison):
+    bare = windows(comparison.problem, replace(comparison.tracking, truth=None), (1, 5), graph=False)
+    with pytest.raises(ValueError, match="without truth"):
+        window_trade(ax, bare, "position")
+
+
+def test_information_grows(comparison):
+    found = observability(comparison.problem, comparison.tracking, twins=False)
+    left, right = Figure().subplots(1, 2)
+    singular_values(left, found)
+    assert [line.get_label() for line in left.lines] == ["best seen", "direction 2", "direction 3", "worst seen", "prior"]
+    assert_allclose(left.lines[0].get_ydata()[-1], found.singular_values[0])
+    bound_sigmas(right, found)
+    assert_allclose(right.lines[2].get_ydata()[-1], found.crlb_sigma[2] / found.scale[2])
+    assert left.get_xlabel() == right.get_xlabel() == "time [s]"
 
 
 # ---- style ---------------------------------------------------------------------------------------------------------------

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import piazzi as pz
-from piazzi.evaluate import Comparison, compare
+from piazzi.evaluate import Comparison, compare, observability, windows
 from piazzi.evaluate.quantities import number
 from piazzi.present.colours import shade_of
-from piazzi.present.report import comparison_tab, write_page
+from piazzi.present.report import comparison_tab, observability_tab, windows_tab, write_page
 from piazzi.scenarios import load_scenario
 
 HOSTILE = "</script><script>hacked=1</script><img src=x onerror=hacked=1>\u2028\u202e&lt;'\"<!--"
@@ -187,6 +187,20 @@ def test_no_text_overlaps_and_nothing_scrolls_sideways(open_page, report, width)
         page.wait_for_timeout(100)
         assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
         assert page.evaluate(OVERLAPS) == []
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_windows_and_observability_have_pages_too(open_page, comparison, tmp_path, width):
+    problem, tracking = comparison.problem, comparison.tracking
+    tabs = [windows_tab(windows(problem, tracking, (1, 10, 50))), observability_tab(observability(problem, tracking))]
+    page = open_page(write_page(tmp_path, "Report", tabs), width=width)
+    for n, charts in ((0, 5), (1, 2)):
+        page.locator(f"#tab-t{n}").click()
+        page.wait_for_timeout(100)
+        assert page.locator(f"#t{n} .plot svg").count() == charts
+        assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+        assert page.evaluate(OVERLAPS) == []
+    assert "Verdict" in page.locator("#t1 .summary").inner_text()
 
 
 def test_every_axis_of_a_quantity_has_its_unit(open_page, report):

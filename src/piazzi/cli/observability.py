@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from piazzi.cli import options, output
+from piazzi.cli import options, output, reporting
 from piazzi.cli.running import DONE
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ ENDINGS = (".json", ".csv")
 @options.as_json
 @options.seed
 @options.scenario
+@reporting.option
 def command(
     source: str,
     added: tuple[str, ...],
@@ -31,6 +32,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
+    report: str | None,
 ) -> int:
     """Tell what can be known of the first state in SOURCE.
 
@@ -47,6 +49,7 @@ def command(
       piazzi observability network.toml --add radar --json
     """
     output.check_output(output_file, ENDINGS)
+    reporting.check(report)
     from piazzi.cli.additions import additions
     from piazzi.cli.sources import load_source
     from piazzi.evaluate import observability
@@ -57,13 +60,18 @@ def command(
     found = observability(problem, tracking, add=add, twins=not no_twins, source=source_found.name)
     if output_file is not None:
         write(output_file, found)
+    if report is not None:
+        from piazzi.present.report import observability_tab
+
+        title, _ = reporting.titled(source, source_found.name, scenario)
+        report = str(reporting.write(report, [observability_tab(found, title=title)]))
     if as_json:
         if output_file != output.STDOUT:
             output.print_json(found.to_dict())
     elif output_file != output.STDOUT:
         from piazzi.present.tables import heading
 
-        wrote = [f"Wrote {output_file}"] if output_file else []
+        wrote = [f"Wrote {path}" for path in (output_file, report) if path]
         output.print_rich(heading(problem, tracking, source_found.name), "", found, *wrote)
     return DONE
 

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from piazzi.cli import options, output, reporting
 from piazzi.cli.running import DONE, NOT_ESTIMATED
+from piazzi.cli.windows import whole_numbers
+
+if TYPE_CHECKING:
+    from piazzi.evaluate import Comparison
+    from piazzi.present.report import Section
 
 DEFAULT = ("ekf", "graph", "window:100")
+
+
+def _lags(context: click.Context, parameter: click.Parameter, text: str | None) -> tuple[int, ...]:
+    return whole_numbers(context, parameter, text) if text is not None else ()
 
 
 @click.command(cls=options.WithEstimators)
@@ -16,16 +27,28 @@ DEFAULT = ("ekf", "graph", "window:100")
 @click.option(
     "-o", "--output", "output_file", metavar="FILE", default="report.html", show_default=True, help="The page, .html."
 )
+@click.option(
+    "--windows", "lags", metavar="N,N,...", callback=_lags, help="Add what windows of so many states, such as 10,50,200, do."
+)
+@click.option("--observability", "seen", is_flag=True, help="Add what can be seen of the first state.")
 @options.seed
 @options.scenario
-def command(sources: tuple[str, ...], names: tuple[str, ...], output_file: str, seed: int, scenario: str | None) -> int:
+def command(
+    sources: tuple[str, ...],
+    names: tuple[str, ...],
+    output_file: str,
+    lags: tuple[int, ...],
+    seen: bool,
+    seed: int,
+    scenario: str | None,
+) -> int:
     """Compare estimators on each SOURCE and write one page.
 
     The page works offline, in any browser: a summary in plain words, then charts to point at, an orbit that plays, and all
     numbers.  It can be printed.
 
     Examples:
-      piazzi report tracking.npz
+      piazzi report tracking.npz --windows 10,50,100,200 --observability
       piazzi report satellite-bearing b612-range --with ekf -o orbits.html
       piazzi report rows.csv --scenario b612-range
     """
@@ -42,8 +65,27 @@ def command(sources: tuple[str, ...], names: tuple[str, ...], output_file: str, 
             source, estimators, seed, scenario if source.lower().endswith(".csv") else None, bar=True
         )
         title, radius = reporting.titled(source, name, scenario)
-        tabs.append(comparison_tab(comparison, title=title, planet_radius=radius))
-        success &= comparison.success
+        more, well = _more(comparison, lags, seen)
+        tabs.append(comparison_tab(comparison, title=title, planet_radius=radius, more=more))
+        success &= comparison.success and well
     wrote = reporting.write(output_file, tabs)
     output.print_rich(f"Wrote {wrote}: open it in a browser.")
     return DONE if success else NOT_ESTIMATED
+
+
+def _more(comparison: Comparison, lags: tuple[int, ...], seen: bool) -> tuple[list[Section], bool]:
+    """Sections on windows and observability where they were asked for, and whether all of it succeeded."""
+    from piazzi.evaluate import observability, windows
+    from piazzi.present.report import observability_section, windows_section
+
+    problem, tracking, sections, well = comparison.problem, comparison.tracking, [], True
+    if lags:
+        from piazzi.evaluate.window_trade import steps_of
+
+        with output.progress(steps_of(lags, tracking)) as step:
+            trade = windows(problem, tracking, lags, source=comparison.source, announce=step)
+        sections.append(windows_section(trade))
+        well = trade.success
+    if seen:
+        sections.append(observability_section(observability(problem, tracking, source=comparison.source)))
+    return sections, well

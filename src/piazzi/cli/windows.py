@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from piazzi.cli import options, output
+from piazzi.cli import options, output, reporting
 from piazzi.cli.running import DONE, NOT_ESTIMATED
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def whole_numbers(context: click.Context, parameter: click.Parameter, text: str)
 @options.as_json
 @options.seed
 @options.scenario
+@reporting.option
 def command(
     source: str,
     lags: tuple[int, ...],
@@ -57,6 +58,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
+    report: str | None,
 ) -> int:
     """Try sliding windows of several lengths on SOURCE.
 
@@ -69,6 +71,7 @@ def command(
       piazzi windows satellite-bearing -o windows.csv
     """
     output.check_output(output_file, ENDINGS)
+    reporting.check(report)
     from piazzi.cli.sources import load_source
     from piazzi.evaluate import windows
     from piazzi.evaluate.window_trade import steps_of
@@ -80,13 +83,18 @@ def command(
         trade = windows(problem, tracking, lags, iterations=iterations, graph=not no_graph, source=found.name, announce=step)
     if output_file is not None:
         write(output_file, trade)
+    if report is not None:
+        from piazzi.present.report import windows_tab
+
+        title, _ = reporting.titled(source, found.name, scenario)
+        report = str(reporting.write(report, [windows_tab(trade, title=title)]))
     if as_json:
         if output_file != output.STDOUT:
             output.print_json(trade.to_dict())
     elif output_file != output.STDOUT:
         from piazzi.present.tables import heading
 
-        wrote = [f"Wrote {output_file}"] if output_file else []
+        wrote = [f"Wrote {path}" for path in (output_file, report) if path]
         output.print_rich(heading(problem, tracking, found.name), "", trade, *wrote)
     return DONE if trade.success else NOT_ESTIMATED
 

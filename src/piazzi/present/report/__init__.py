@@ -15,7 +15,9 @@ from piazzi.present.report.blocks import (
     Track,
 )
 from piazzi.present.report.comparison import comparison_tab
+from piazzi.present.report.observability import observability_section, observability_tab
 from piazzi.present.report.page import page
+from piazzi.present.report.windows import windows_section, windows_tab
 from piazzi.present.report.write import write_page
 
 __all__ = [
@@ -32,6 +34,10 @@ __all__ = [
     "Text",
     "Track",
     "comparison_tab",
+    "observability_section",
+    "observability_tab",
     "page",
+    "windows_section",
+    "windows_tab",
     "write_page",
 ]

@@ -11,7 +11,7 @@ from typing import Any
 from piazzi.evaluate.quantities import Display, printable
 from piazzi.present.report.blocks import Axis, Block, Chart, Line, Now, Orbit, Section, Tab, Table, Text, Track
 from piazzi.present.report.encode import Pool, script_json
-from piazzi.present.report.pieces import line_mark, summary_point, tab_chooser, table_panel, text
+from piazzi.present.report.pieces import legend, line_mark, summary_point, tab_chooser, table_panel, text
 
 SCRIPTS = ("data.js", "scales.js", "chart.js", "orbit.js", "tab.js", "page.js")
 
@@ -100,7 +100,7 @@ class _Builder:
 
     def _bar(self, tab: Tab) -> str:
         """What moves and switches everything on the tab, always in sight."""
-        if not tab.keys:
+        if not tab.keys and tab.times is None:
             return ""
         play = slider = ""
         if tab.times is not None and len(tab.times) > 1:
@@ -114,7 +114,7 @@ class _Builder:
             for i, key in enumerate(tab.keys)
         )
         options = "".join(f'<option value="{i}">{text(key.label)}</option>' for i, key in enumerate(tab.keys))
-        focus = f'<label class="focus">Look closely at <select>{options}</select></label>'
+        focus = f'<label class="focus">Look closely at <select>{options}</select></label>' if tab.keys else ""
         again = '<button type="button" class="quiet unzoom" hidden>Whole run</button>'
         return (
             f'<div class="bar" role="group" aria-label="Time and estimators">'
@@ -130,7 +130,7 @@ class _Builder:
     def _block(self, block: Block) -> str:
         match block:
             case Chart():
-                return self._drawing(block.title, block.note, self._chart(block))
+                return self._drawing(block.title, block.note, self._chart(block), legend(block.lines))
             case Orbit():
                 return self._drawing(block.title, block.note, self._orbit(block))
             case Table():
@@ -143,11 +143,11 @@ class _Builder:
             case Text():
                 return '<div class="panel full">' + "".join(f"<p>{text(p)}</p>" for p in block.paragraphs) + "</div>"
 
-    def _drawing(self, title: str, note: str, drawing: dict[str, Any]) -> str:
+    def _drawing(self, title: str, note: str, drawing: dict[str, Any], legend: str = "") -> str:
         self.drawings.append(drawing | {"title": printable(title)})
         remark = f'<p class="remark">{text(note)}</p>' if note else ""
         return (
-            f'<figure class="panel"><figcaption><h4>{text(title)}</h4></figcaption>'
+            f'<figure class="panel"><figcaption><h4>{text(title)}</h4>{legend}</figcaption>'
             f'<div class="plot" data-drawing="{len(self.drawings) - 1}"></div>{remark}</figure>'
         )
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 
 from piazzi.evaluate.quantities import printable
-from piazzi.present.report.blocks import Key, Point, Tab, Table
+from piazzi.present.report.blocks import Key, Line, Point, Tab, Table
 
 
 def text(words: str) -> str:
@@ -22,6 +22,13 @@ def tab_chooser(tabs: Sequence[Tab]) -> str:
         for n, tab in enumerate(tabs)
     )
     return f'<nav class="wide" role="tablist" aria-label="Problems">{buttons}</nav>'
+
+
+def legend(lines: Sequence[Line]) -> str:
+    """Marks and labels of lines that have no entry in the legend of the tab."""
+    found = {line.label: Key(line.label, line.colour, line.dash) for line in lines if line.key < 0}
+    items = "".join(f"<span>{line_mark(key)}{text(key.label)}</span>" for key in found.values())
+    return f'<div class="legend">{items}</div>' if items else ""
 
 
 def summary_point(point: Point) -> str:
