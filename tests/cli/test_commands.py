@@ -50,6 +50,22 @@ def test_substeps_are_chosen_by_a_tolerance(call, tmp_path):
     assert "tolerance is -1" in call("simulate", SCENARIO, "--tolerance", -1).refused()
 
 
+def test_the_notebooks_options_of_simulation(call, tmp_path):
+    """Noiseless, a perfect guess, a fixed or a drawn truth: each as asked for, and nothing else."""
+    plain = pz.load(SCENARIO)[1]
+    found = {}
+    for flags in (["--noiseless"], ["--perfect-guess"], ["--truth", "drawn"], ["--truth", "fixed"]):
+        assert call("simulate", SCENARIO, *flags, "-o", tmp_path / "t.nc").status == 0
+        found[flags[-1]] = pz.load(tmp_path / "t.nc")
+    problem, tracking = found["--noiseless"]
+    assert (tracking.values == problem.measure("radar", tracking.truth, tracking.times)).all()
+    problem, tracking = found["--perfect-guess"]
+    assert problem.mean.tolist() == tracking.truth[0].tolist() == plain.truth[0].tolist()
+    assert (found["drawn"][1].truth[0] != plain.truth[0]).all()
+    assert (found["fixed"][1].values == plain.values).all()
+    assert "'fixed', 'drawn'" in call("simulate", SCENARIO, "--truth", "free").refused()
+
+
 def test_a_problem_that_a_format_cannot_hold_leaves_no_file(call, tmp_path):
     call("simulate", SCENARIO, "-o", tmp_path / "t.npz").refused()
     assert not list(tmp_path.iterdir())

@@ -8,7 +8,7 @@ import pytest
 
 import piazzi as pz
 from piazzi.problem import Gaussian
-from piazzi.scenarios import load_scenario
+from piazzi.scenarios import load_scenario, show
 
 SCENARIO = "b612-range"
 
@@ -183,3 +183,20 @@ def test_an_estimate_that_is_not_finite_is_status_3_and_still_strict_json(call, 
     (row,) = result.document["rows"]
     assert (result.status == 3) == (not row["success"])
     json.loads((tmp_path / "fall.json").read_text(), parse_constant=pytest.fail)
+
+
+def test_long_steps_are_warned_of_in_one_line(call, tmp_path):
+    """On a recording, and where the truth has steps of its own; not where it was simulated with the same ones."""
+    text = show(SCENARIO).replace("substeps = 10", "substeps = 1").replace("step = 0.1", "step = 0.8")
+    coarse, fine = tmp_path / "coarse.toml", tmp_path / "fine.toml"
+    coarse.write_text(text)
+    fine.write_text(text + '\n[truth.integrator]\nmethod = "rk4"\nsubsteps = 40\n')
+    assert call("simulate", fine, "-o", tmp_path / "rows.csv").status == 0
+    for arguments in ([fine], [tmp_path / "rows.csv", "--scenario", coarse]):
+        for estimator in ("ekf", "graph", "window:5"):
+            result = call("estimate", *arguments, "--with", estimator, "--json")
+            (line,) = result.said
+            name = arguments[0].name
+            assert line.startswith(f"piazzi: warning: {name}: the integrator's steps are too long: 4 times as many move '")
+            assert result.document["rows"][0]["success"]
+    assert call("estimate", coarse, "--json").said == []

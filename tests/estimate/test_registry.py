@@ -35,6 +35,8 @@ from piazzi.estimate.registry import ESTIMATORS, parse, views_of
         ("window", pz.SlidingWindow()),
         ("window:7", pz.SlidingWindow(lag=7)),
         (" window:100x3 ", pz.SlidingWindow(lag=100, iterations=3)),
+        ("window:60s", pz.SlidingWindow(lag_seconds=60.0)),
+        ("window:0.5sx2", pz.SlidingWindow(lag_seconds=0.5, iterations=2)),
     ],
 )
 def test_names_mean_estimators(text, estimator):
@@ -68,6 +70,9 @@ def test_names_mean_estimators(text, estimator):
         ("window:x3", "write window:LAG or window:LAGxITERATIONS"),
         ("window:-5", "write window:LAG"),
         ("window:1.5", "write window:LAG"),
+        ("window:60m", "or window:60s for seconds"),
+        ("window:1e3s", "write window:LAG"),
+        ("window:60sx0", "iterations is 0"),
         ("window:9999999999999", "write window:LAG"),
         ("window:\u0663", "write window:LAG"),  # a digit, but not one of ours
     ],

@@ -87,6 +87,59 @@ def test_iterated_update_is_the_hand_written_one(iterations, update):
     assert estimate.iterations == 7 * iterations
 
 
+def iterated_b612(problem, tracking, iterations):
+    """The same by hand for ranges of a probe about a planet: x_i+1 = x + K (z - h(x_i) - H (x - x_i)), 10 RK4 substeps."""
+    step = textbook.runge_kutta(lambda t, x: textbook.gravity(x, problem.parameters["mu"]), 10)
+    x, P, R = problem.mean, problem.covariance, problem.stations[0].noise
+    means = [x]
+    for k, z in enumerate(tracking.values):
+        if k:
+            x, Phi = step(x, tracking.times[k - 1], tracking.times[k] - tracking.times[k - 1])
+            P = Phi @ P @ Phi.T + problem.process_noise.covariance
+        row, xi = textbook.range_from(np.array([10.0, 0.0]), z, R), x
+        for _ in range(iterations):
+            H = row.H(xi)
+            K = P @ H.T / (H @ P @ H.T + R)
+            xi = x + K @ (z - row.h(xi) - H @ (x - xi))
+        A = np.eye(4) - K @ H
+        x, P = xi, A @ P @ A.T + K @ R @ K.T
+        means.append(x)
+    return np.array(means[1:])
+
+
+@pytest.mark.slow
+def test_iterating_on_ranges_alone_is_worse_by_its_nature():
+    """120 recordings: the independent filter agrees, and is no better than the plain one.
+
+    A range pins the state to a ring, and the probe is closer to the radar than its prediction is sure.  The mode of each epoch
+    is then a sharp guess about what nobody saw: more iterations, more of that.
+    """
+    problem, rms = b612(), {1: [], 5: []}
+    for seed in range(120):
+        tracking = pz.simulate(problem, np.arange(100) * 0.1, np.random.default_rng(seed))
+        for iterations, found in rms.items():
+            estimate = pz.ExtendedKalmanFilter(iterations=iterations).estimate(problem, tracking)
+            found.append(np.sqrt(np.mean(np.sum((estimate.mean - tracking.truth)[:, :2] ** 2, axis=1))))
+        sigma = np.sqrt(np.diagonal(estimate.covariance, axis1=1, axis2=2))
+        assert np.abs((estimate.mean - iterated_b612(problem, tracking, 5)) / sigma).max() < 1e-7
+    assert np.median(rms[5]) > 1.2 * np.median(rms[1])
+
+
+def test_iterating_pays_where_an_epoch_sees_all_that_it_is_nonlinear_in():
+    """Range and bearing together, far sharper than the prediction: errors fall, and the covariance says so."""
+    problem = two_radars((1e-4, 1e-4))
+    errors, honesty = {1: [], 5: []}, {1: [], 5: []}
+    for seed in range(40):
+        tracking = pz.simulate(problem, np.arange(20.0), np.random.default_rng(seed))
+        for iterations, found in errors.items():
+            estimate = pz.ExtendedKalmanFilter(iterations=iterations).estimate(problem, tracking)
+            found.append(np.mean((estimate.mean - tracking.truth)[:, :2] ** 2))
+            honesty[iterations].append(metrics.nees(estimate).mean())
+    assert np.mean(errors[5]) < 0.5 * np.mean(errors[1])
+    assert np.mean(honesty[5]) == pytest.approx(4, abs=1)  # the number of states
+    assert np.mean(honesty[1]) > 20
+
+
 @pytest.mark.usefixtures("uncompiled")
 def test_iterated_update_ends_where_the_cost_is_least():
     """The fixed point is the mode of the posterior: the gradient of prediction and measurement terms together is zero."""

@@ -1,5 +1,6 @@
 """How much the steps matter: measured, chosen by a tolerance, and warned of."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi import kernels
+from piazzi.estimate import substeps
 from piazzi.estimate.substeps import choose_substeps, step_warning, substep_error
 from tests.laws.problems import linear, random_covariance, satellite
 from tests.solvers import orbits
@@ -15,28 +17,66 @@ from tests.solvers import orbits
 TIMES = np.arange(200) * 15.0
 
 
-@pytest.mark.usefixtures("uncompiled")
-def test_the_bias_is_the_filter_s_error_where_nothing_else_errs():
-    """A linear problem without noise: what separates the filter from the truth is its steps alone (to first order)."""
-    model = pz.Model(["q", "w"], ["w", "-q"], [pz.Sensor("s", ["q"])])
-    calm = pz.ProcessNoise([0.0, 0.0])
-    problem = pz.Problem(
-        model,
+def oscillator(count: int) -> pz.Problem:
+    """Linear and undisturbed: the filter differs from the truth, whose steps are four times finer, by its steps alone."""
+    return pz.Problem(
+        pz.Model(["q", "w"], ["w", "-q"], [pz.Sensor("s", ["q"])]),
         pz.Gaussian([1, 0], np.eye(2)),
         pz.ProcessNoise([0.0, 0.01], "second", "scaled"),
         [pz.Station("a", "s", 0.01)],
-        integrator=pz.Midpoint(3),
-        truth=pz.Truth([1.0, 0.0], process_noise=calm, integrator=pz.Midpoint(12), measurement_noise=False),
+        integrator=pz.Midpoint(count),
+        truth=pz.Truth(
+            [1.0, 0.0],
+            process_noise=pz.ProcessNoise([0.0, 0.0]),
+            integrator=pz.Midpoint(4 * count),
+            measurement_noise=False,
+        ),
     )
-    rng = np.random.default_rng(0)
-    tracking = pz.simulate(problem, np.cumsum(rng.uniform(0.1, 0.5, 30)), rng)
-    error = substep_error(problem, tracking)
-    estimate = pz.ExtendedKalmanFilter().estimate(problem, tracking)
-    assert_allclose(error.bias, estimate.mean - tracking.truth, rtol=0, atol=0.01 * np.abs(error.bias).max())
-    assert_allclose(error.sigma, np.sqrt(np.diagonal(estimate.covariance, axis1=1, axis2=2)), rtol=1e-12)
-    assert error.worst == error.sigmas.max()
-    k = list(error.times).index(error.where[1])
-    assert error.sigmas[k, ["q", "w"].index(error.where[0])] == error.worst
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_the_bias_is_the_filter_s_error_where_nothing_else_errs():
+    """Up to the product of two errors: the bias is carried by the derivative of the coarse step, the truth by the fine one's.
+
+    Both errors are of order h^2, so with half the step the difference, beside the bias, falls to a quarter.
+    """
+    times = np.cumsum(np.random.default_rng(0).uniform(0.1, 0.5, 30))
+    beside = []
+    for count in (3, 6):
+        problem = oscillator(count)
+        tracking = pz.simulate(problem, times, np.random.default_rng(0))
+        error = substep_error(problem, tracking)
+        estimate = pz.ExtendedKalmanFilter().estimate(problem, tracking)
+        unseen = error.bias - (estimate.mean - tracking.truth)
+        beside.append(np.abs(unseen).max() / np.abs(error.bias).max())
+        assert_allclose(error.sigma, np.sqrt(np.diagonal(estimate.covariance, axis1=1, axis2=2)), rtol=1e-12)
+        assert error.worst == error.sigmas.max()
+        k = list(error.times).index(error.where[1])
+        assert error.sigmas[k, ["q", "w"].index(error.where[0])] == error.worst
+    assert beside[0] < 0.01
+    assert beside[1] / beside[0] == pytest.approx(1 / 4, rel=0.15)
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_the_bias_is_the_recursion_written_here():
+    """b' = (I - K H) (Phi b + one step's error), with the filter's own gains, means and steps, on the same run."""
+    problem = oscillator(3)
+    times = np.cumsum(np.random.default_rng(0).uniform(0.1, 0.5, 30))
+    tracking = pz.simulate(problem, times, np.random.default_rng(0))
+    fine = replace(problem, integrator=pz.Midpoint(12))
+    x, P, b = problem.mean, problem.covariance, np.zeros(2)
+    expected, before, H, R = [], times[0], np.array([[1.0, 0.0]]), 0.01
+    for t, z in zip(times, tracking.values[:, 0], strict=True):
+        if t > before:
+            exact = fine.step(x, t - before)[0]
+            x, Phi = problem.step(x, t - before)
+            b = Phi @ b + x - exact
+            P = Phi @ P @ Phi.T + problem.process_noise.covariance * (t - before)
+        before = t
+        K = P @ H.T / (H @ P @ H.T + R)
+        x, b, P = x + K[:, 0] * (z - x[0]), b - K[:, 0] * b[0], (np.eye(2) - K @ H) @ P
+        expected.append(b)
+    assert_allclose(substep_error(problem, tracking).bias, expected, rtol=0, atol=1e-14)
 
 
 @pytest.mark.slow
@@ -45,13 +85,39 @@ def test_one_long_step_is_warned_of_and_short_ones_are_not():
     long, short = satellite(kernels.Taylor(1)), satellite(kernels.RungeKutta4(10))
     tracking = pz.simulate(short, np.arange(1441) * 15.0, np.random.default_rng(1))
     text = step_warning(long, tracking)
-    assert "too long" in text
-    assert "sigma at t =" in text
+    found = re.fullmatch(
+        r"the integrator's steps are too long: 4 times as many move '(\w+)' by (\S+) sigma at t = (\S+) s; .*", text
+    )
+    assert float(found[2]) == pytest.approx(substep_error(long, tracking).worst, rel=0.1)  # the same, to first order
     assert step_warning(short, tracking) == ""
+    assert step_warning(long, tracking, limit=1e3) == ""
+    assert "too long" in step_warning(long, tracking, estimator=pz.SlidingWindow(5))
     estimates = [pz.ExtendedKalmanFilter().estimate(p, tracking) for p in (long, short)]
     sigma = np.sqrt(np.diagonal(estimates[1].covariance, axis1=1, axis2=2))
     actual = (np.abs(estimates[0].mean - estimates[1].mean) / sigma).max()
     assert 0.3 * actual < substep_error(long, tracking).worst < 3 * actual
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_a_filter_that_is_lost_with_any_steps_says_nothing_about_them():
+    """Measurements of something else altogether: no warning about steps, however long they are."""
+    rng = np.random.default_rng(0)
+    tracking = pz.Tracking(np.arange(50) * 0.5, 100 * rng.standard_normal(50))
+    assert step_warning(oscillator(1), tracking) == ""
+    own = pz.simulate(replace(oscillator(1), truth=None, integrator=pz.RungeKutta4(10)), tracking.times, rng)
+    assert "too long" in step_warning(replace(oscillator(1), integrator=pz.Euler(1)), own)
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_of_a_long_recording_the_beginning_is_looked_at(monkeypatch):
+    monkeypatch.setattr(substeps, "LOOKED_AT", 20)
+    problem = replace(oscillator(1), integrator=pz.Euler(1), truth=None)
+    times = np.concatenate([np.arange(20) * 1e-4, 1.0 + np.arange(20)])
+    rows = np.repeat(times, 2)
+    short, long = (pz.Tracking(rows[:n], np.cos(rows[:n]), np.full(n, "a")) for n in (40, 80))
+    assert step_warning(problem, short) == step_warning(problem, long) == ""
+    monkeypatch.setattr(substeps, "LOOKED_AT", 40)
+    assert "too long" in step_warning(problem, long)
 
 
 @pytest.mark.usefixtures("uncompiled")

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from piazzi.cli import output
-from piazzi.cli.sources import load_source
+from piazzi.cli.running import say
+from piazzi.cli.sources import Source, load_source
 
 if TYPE_CHECKING:
     from piazzi.estimate import Estimator
@@ -26,4 +27,31 @@ def run_comparison(
 
     found = load_source(source, seed, scenario)
     with output.progress(len(estimators), long=bar or len(found.tracking.times) * len(estimators) > _LONG) as step:
-        return found.name, compare(found.problem, found.tracking, estimators, source=found.name, announce=step)
+        comparison = compare(found.problem, found.tracking, estimators, source=found.name, announce=step)
+    _warn_of_steps(found, comparison, estimators)
+    return found.name, comparison
+
+
+def _warn_of_steps(found: Source, comparison: Comparison, estimators: Mapping[str, Estimator]) -> None:
+    """One line on stderr where the steps are long beside the noise, unless the truth was simulated with the same steps.
+
+    Judged by an estimator whose kernel this run has compiled anyway: the filter, where it or a graph (which starts from it)
+    is asked for, else the first that gives states in real time.
+    """
+    from piazzi.estimate import ExtendedKalmanFilter, FactorGraph
+    from piazzi.estimate.registry import views_of
+    from piazzi.estimate.substeps import step_warning
+
+    truth = found.problem.truth
+    if not found.recorded and (truth is None or truth.integrator is None):
+        return
+    used = [estimators[name] for name, estimate in comparison.estimates.items() if estimate.success]
+    plain = ExtendedKalmanFilter()
+    if not any(e == plain or isinstance(e, FactorGraph) for e in used):
+        used = [e for e in used if "realtime" in views_of(e)]
+        if not used:
+            return
+        plain = used[0]  # type: ignore[assignment]
+    text = step_warning(found.problem, found.tracking, estimator=plain)
+    if text:
+        say(f"warning: {found.name}: {text}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -28,8 +29,21 @@ ENDINGS = (".nc", ".csv", ".npz")
     metavar="SIGMA",
     help="Choose the substeps: their error moves no estimate by more standard deviations.",
 )
+@click.option(
+    "--truth", type=click.Choice(("fixed", "drawn")), help="Where the truth starts: at one place, or drawn from the prior."
+)
+@click.option("--perfect-guess", is_flag=True, help="The prior's mean is the true first state (-o FILE.nc keeps it).")
+@click.option("--noiseless", is_flag=True, help="Sensors without error; what estimators believe of them stays.")
 def command(
-    source: str, output_file: str | None, as_json: bool, seed: int, scenario: str | None, tolerance: float | None
+    source: str,
+    output_file: str | None,
+    as_json: bool,
+    seed: int,
+    scenario: str | None,
+    tolerance: float | None,
+    truth: Literal["fixed", "drawn"] | None,
+    perfect_guess: bool,
+    noiseless: bool,
 ) -> int:
     """Draw a true path and measurements of it.
 
@@ -40,6 +54,7 @@ def command(
       piazzi simulate my-scenario.toml -o rows.csv
       piazzi simulate b612-range -o - | piazzi estimate - --scenario b612-range
       piazzi simulate satellite-bearing --tolerance 0.01 -o fine.nc
+      piazzi simulate b612-range --truth drawn --noiseless -o exact.nc
     """
     output.check_output(output_file, ENDINGS)
     if as_json and output_file == output.STDOUT:
@@ -48,11 +63,15 @@ def command(
 
     found = load_source(source, seed, scenario)
     problem, tracking = found.problem, found.tracking
+    if truth or perfect_guess or noiseless:
+        from piazzi.scenarios import vary
+
+        problem = vary(problem, truth=truth, perfect_guess=perfect_guess, noiseless=noiseless)
     if tolerance is not None:
         from piazzi.estimate.substeps import choose_substeps
 
         problem = choose_substeps(problem, tracking.times, tolerance)
-    if found.recorded or tolerance is not None:
+    if found.recorded or problem is not found.problem:
         import numpy as np
 
         from piazzi.simulation import simulate
@@ -78,13 +97,19 @@ def to_dict(problem: Problem, tracking: Tracking, name: str, seed: int, output_f
         "seed": seed,
         "epochs": len(tracking.times),
         "measurements": len(tracking.row_times),
-        "integrator": str(true_problem(problem).integrator),
+        "integrator": steps(true_problem(problem).integrator),
         "states": list(problem.model.names),
         "units": {n: problem.model.unit(n) for n in problem.model.names},
         "first": {"time": float(tracking.times[0]), "truth": tracking.truth[0].tolist()},
         "final": {"time": float(tracking.times[-1]), "truth": tracking.truth[-1].tolist()},
         "output": output_file,
     }
+
+
+def steps(integrator: Any) -> str:
+    """The integrator with the settings that it has, such as ``RungeKutta4(substeps=10)``."""
+    given = [f"{f.name}={getattr(integrator, f.name)!r}" for f in fields(integrator) if getattr(integrator, f.name) is not None]
+    return f"{type(integrator).__name__}({', '.join(given)})"
 
 
 def write(path: str, problem: Problem, tracking: Tracking) -> None:
@@ -106,6 +131,6 @@ def _print(problem: Problem, tracking: Tracking, name: str, seed: int, output_fi
     from piazzi.present.tables import heading, truth_table
     from piazzi.simulation import true_problem
 
-    steps = f"Steps: {true_problem(problem).integrator}"
+    how = f"Steps: {steps(true_problem(problem).integrator)}"
     after = f"Wrote {output_file}" if output_file else "Nothing was written: -o tracking.nc keeps it."
-    output.print_rich(heading(problem, tracking, name, f", seed {seed}"), "", truth_table(problem, tracking), "", steps, after)
+    output.print_rich(heading(problem, tracking, name, f", seed {seed}"), "", truth_table(problem, tracking), "", how, after)

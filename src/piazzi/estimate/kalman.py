@@ -50,6 +50,11 @@ class ExtendedKalmanFilter:
     -----
     Jazwinski, Stochastic Processes and Filtering Theory (1970), ch. 8; covariance updates in Joseph form.  All measurements
     of one epoch are linearised once, at the predicted state (or, iterated, at the estimate so far).
+
+    Iterating pays where an epoch sees all that it is nonlinear in, and sees it sharply: range and bearing of two radars, 100
+    runs, RMS error 0.030 instead of 0.087 and mean NEES 3.8 instead of 4300, for 4 states.  Where an epoch sees less, its mode
+    is a sharp guess about the rest, and iterating is worse: on 500 runs of b612-range (ranges alone) the median position RMSE
+    is 1.3 m plain, 2.1 m with 5 iterations and 3.3 m with 20.  A window or a graph iterates over many epochs, and gains.
     """
 
     update: Update = "auto"

@@ -109,10 +109,17 @@ def _window(option: str) -> Mapping[str, Any]:
 
 
 def _size(option: str) -> Mapping[str, Any]:
-    found = re.fullmatch(r"(\d{1,9})(?:x(\d{1,9}))?", option, re.ASCII)
-    if option and not found:
-        raise ValueError("write window:LAG or window:LAGxITERATIONS, such as window:100 or window:100x3")
-    return {k: int(v) for k, v in zip(("lag", "iterations"), found.groups(), strict=True) if v} if found else {}
+    """States or seconds, then how often: ``100``, ``100x3``, ``60s``, ``60sx3``."""
+    found = re.fullmatch(r"(?:(\d{1,9})|(\d{1,9}(?:\.\d{1,9})?)s)(?:x(\d{1,9}))?", option, re.ASCII)
+    if not option:
+        return {}
+    if not found:
+        raise ValueError(
+            "write window:LAG or window:LAGxITERATIONS, such as window:100, window:100x3, or window:60s for seconds"
+        )
+    states, seconds, iterations = found.groups()
+    lag = {"lag_seconds": float(seconds)} if seconds else {"lag": int(states)}
+    return lag | ({"iterations": int(iterations)} if iterations else {})
 
 
 ESTIMATORS: Mapping[str, Entry] = {
@@ -166,8 +173,8 @@ ESTIMATORS: Mapping[str, Entry] = {
         _graph,
     ),
     "window": Entry(
-        "window:LAG[xITERATIONS][:LOSS[=K]]",
-        "factor graph over the newest LAG states",
+        "window:LAG[s][xITERATIONS][:LOSS[=K]]",
+        "factor graph over the newest LAG states, or LAG seconds",
         "piazzi.estimate.sliding_window:SlidingWindow",
         ("realtime", "delayed"),
         _window,
