@@ -7,5 +7,7 @@ SECTIONS = {
     "solve": "one linear solve, and one optimisation, beside GTSAM",
     "filterpy": "extended Kalman filter beside filterpy",
     "start_up": "whole processes: warm, cold, help, import",
+    "live": "one measurement at a time",
+    "files": "files of a million measurements",
     "length": "time per epoch and memory against the number of epochs",
 }

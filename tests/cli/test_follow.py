@@ -2,8 +2,10 @@
 
 import json
 import random
+import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -115,35 +117,39 @@ def test_a_stream_that_goes_on_is_taken_whole(measurements, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("estimator", ["ekf", "window:8", "ukf"])
 def test_killed_at_random_moments_it_resumes_to_the_same_bytes(measurements, tmp_path, estimator):
-    """SIGKILL ten times for each estimator; the measurements trickle in, so that the moments fall all over the run."""
+    """SIGKILL ten times for each estimator, each at a random moment after its first new estimate."""
     problem, _, _ = measurements
-    tracking = pz.simulate(problem, np.arange(400) * 0.1, np.random.default_rng(5))
-    lines = [
-        "time,range",
-        *(f"{t!r},{z!r}" for t, z in zip(tracking.times.tolist(), tracking.values[:, 0].tolist(), strict=True)),
-    ]
-    rows = tmp_path / "rows.csv"
+    tracking = pz.simulate(problem, np.arange(4000) * 0.1, np.random.default_rng(5))
+    pairs = zip(tracking.times.tolist(), tracking.values[:, 0].tolist(), strict=True)
+    lines = ["time,range", *(f"{t!r},{z!r}" for t, z in pairs)]
+    rows, whole, out, state = (tmp_path / name for name in ("rows.csv", "whole.csv", "out.csv", "state.npz"))
     rows.write_text("\n".join(lines) + "\n")
-    whole, out, state = tmp_path / "whole.csv", tmp_path / "out.csv", tmp_path / "state.npz"
     settings = ["--with", estimator]
     assert run(rows, *settings, "-o", whole).returncode == 0
-    moments = random.Random(7)
+    moments, sizes = random.Random(7), [0]
     for _ in range(10):
-        with subprocess.Popen(
-            [*FOLLOW, "-", *settings, "-o", str(out), "--checkpoint", str(state)],
-            stdin=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        ) as tool:
-            end = time.monotonic() + moments.uniform(0.8, 2.5)
-            for line in lines:
-                if time.monotonic() > end:
-                    break
-                tool.stdin.write(line + "\n")
-                tool.stdin.flush()
-                time.sleep(0.004)
+        command = [*FOLLOW, "-", *settings, "-o", str(out), "--checkpoint", str(state)]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0) as tool:
+            feeder = threading.Thread(target=trickle, args=(tool.stdin, lines), daemon=True)
+            feeder.start()
+            while tool.poll() is None and (out.stat().st_size if out.exists() else 0) <= sizes[-1]:
+                time.sleep(0.001)
+            time.sleep(moments.uniform(0.0, 0.25))
             tool.kill()
-            tool.stdin.close() if not tool.stdin.closed else None
-    assert out.exists()
+            feeder.join()
+        assert tool.returncode == -signal.SIGKILL  # it was still at work
+        sizes.append(out.stat().st_size)
+    assert sizes[1] > 0
+    assert sizes[-1] < whole.stat().st_size
     assert run(rows, *settings, "-o", out, "--checkpoint", state).returncode == 0
     assert out.read_bytes() == whole.read_bytes()
+
+
+def trickle(stream, lines):
+    """A sensor that sends a line a millisecond, whoever listens."""
+    try:
+        for line in lines:
+            stream.write(line.encode() + b"\n")
+            time.sleep(0.001)
+    except OSError:
+        pass

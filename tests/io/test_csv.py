@@ -118,10 +118,13 @@ ALPHABET = st.sampled_from(
 @given(
     st.lists(ALPHABET, max_size=30).map("".join),
     st.sampled_from([["time"], ["time", "range"], ["time", "station"], ["time", "station", "range"]]),
+    st.integers(1, 40),
 )
-def test_whatever_the_fast_way_takes_the_careful_way_takes_too(text, header):
+def test_whatever_the_fast_way_takes_the_careful_way_takes_too(text, header, piece):
     body = text.strip("\n").encode()
-    fast = cells.fast(body, 2, header, ())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cells, "PIECE", piece)
+        fast = cells.fast(body, 2, header, ())
     if fast is not None:
         careful = cells.parse_rows(body, 2, header, ())
         assert all(same_bits(fast.numbers[name], careful.numbers[name]) for name in careful.numbers)
