@@ -6,9 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+import piazzi as pz
 from piazzi.evaluate import errors, has_diverged, nees, nis, rmse
-from piazzi.evaluate.metrics import squared_in_sigmas
+from piazzi.evaluate.metrics import residual_rms, squared_in_sigmas
 from tests.evaluate.conftest import made
+from tests.laws.problems import b612
 
 
 def covariances(rng, K, n, condition=1e4):
@@ -178,3 +180,15 @@ def test_without_truth_innovations_tell(size, expected):
 def test_a_run_of_few_epochs_can_be_judged(epochs):
     assert has_diverged(made(1e6 * np.ones((epochs, 2)), np.eye(2), truth=np.zeros((epochs, 2)))) in (True, False)
     assert not has_diverged(made(np.ones((epochs, 2)), np.eye(2), truth=np.zeros((epochs, 2))))
+
+
+def test_residuals_are_what_the_states_leave_of_the_measurements():
+    problem = b612()
+    tracking = pz.simulate(problem, np.arange(40) * 0.1, np.random.default_rng(1))
+    values = tracking.values.copy()
+    values[3] = np.nan
+    estimate = pz.FactorGraph().estimate(problem, pz.Tracking(tracking.row_times, values))
+    left = values[:, 0] - problem.measure("radar", estimate.mean)[:, 0]
+    assert_allclose(estimate.details["residuals"][:, 0], left, rtol=0, atol=1e-9)
+    assert residual_rms(estimate) == {"range": pytest.approx(np.sqrt(np.nanmean(left**2)))}
+    assert residual_rms(pz.ExtendedKalmanFilter().estimate(problem, tracking)) == {}

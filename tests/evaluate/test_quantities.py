@@ -40,6 +40,11 @@ def test_value_and_sigma_share_their_decimals(value, sigma):
     assert float(spread) == pytest.approx(sigma, rel=0.06, abs=0.5 if sigma >= 10 else 0)
 
 
+def test_large_values_keep_the_digits_that_their_sigma_leaves():
+    assert with_sigma(3.98600398739e14, 4.157e5) == ("3.9860039874e+14", "420000")
+    assert with_sigma(2.0, 1e10)[1] == "1.0e+10"
+
+
 @pytest.mark.parametrize("sigma", [0.0, nan, inf, 1e-300])
 def test_a_sigma_that_says_nothing_takes_no_digits_away(sigma):
     assert with_sigma(1.25, sigma)[0] == "1.25000"

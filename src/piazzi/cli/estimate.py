@@ -112,6 +112,7 @@ def predicted(comparison: Comparison, ahead: str) -> dict[str, Forecast]:
 
 def to_dict(comparison: Comparison, forecasts: Mapping[str, Forecast]) -> dict[str, Any]:
     """The comparison's object with units, and in every row the last state with its sigmas and, if asked, later ones."""
+    from piazzi.evaluate.metrics import residual_rms
     from piazzi.evaluate.quantities import finite
 
     model, views = comparison.problem.model, comparison.views
@@ -125,6 +126,7 @@ def to_dict(comparison: Comparison, forecasts: Mapping[str, Forecast]) -> dict[s
                 "mean": [finite(v) for v in estimate.mean[-1].tolist()],
                 "sigma": [finite(v**0.5) if v >= 0 else None for v in variances],
             }
+            row["residual_rms"] = {name: finite(v) for name, v in residual_rms(estimate).items()}
         if row["estimator"] in forecasts:
             row["prediction"] = prediction(forecasts[row["estimator"]])
     return document
@@ -167,10 +169,10 @@ def series(estimate: Estimate) -> dict[str, Any]:
 
 
 def _print(comparison: Comparison, source_name: str, output_file: str | None, forecasts: Mapping[str, Forecast]) -> None:
-    from piazzi.present.tables import forecast_table, heading, state_table
+    from piazzi.present.tables import forecast_table, heading, residual_line, state_table
 
     parts: list[Any] = [heading(comparison.problem, comparison.tracking, source_name), ""]
     for name, estimate in comparison.estimates.items():  # at the last epoch both views of a window are one
-        parts += [state_table(name, estimate), ""]
+        parts += [state_table(name, estimate), *residual_line(estimate), ""]
         parts += [forecast_table(name, forecasts[name]), ""] if name in forecasts else []
     output.print_rich(*parts, comparison, *([f"Wrote {output_file}"] if output_file and comparison.estimates else []))

@@ -107,7 +107,7 @@ class BatchLeastSquares:
             watch.seconds(),
             "delayed",
             None,
-            outcome.details | {"start": used},
+            outcome.details | {"start": used, "residuals": chain.residuals()},
             outcome.failure or undetermined(calm, outcome.covariance[0], chain.x),
         )
 

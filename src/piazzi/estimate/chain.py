@@ -131,6 +131,14 @@ class Chain:
 
     def innovations(self) -> tuple[Array, Array]:
         """Innovations and their covariances along the final linearisation, (J, m) and (J, m, m)."""
+        return self._differences(self.d_pred, self.P_pred)
+
+    def residuals(self) -> Array:
+        """Measurements minus what the states say they should be, (J, m), NaN where missing."""
+        return self._differences(np.zeros_like(self.d_pred), np.zeros_like(self.P_pred))[0]
+
+    def _differences(self, d: Array, P: Array) -> tuple[Array, Array]:
+        """z - h(x) - H d and H P H^T + R of all rows."""
         i, M, N = self.inputs, self.problem.model.width, self.problem.model.n
         nu, S = np.empty((len(i.z), M)), np.empty((len(i.z), M, M))
         self.library.graph_innovations(
@@ -139,8 +147,8 @@ class Chain:
             *i.measured(self.problem),
             self.problem.given,
             self.x,
-            self.d_pred,
-            self.P_pred,
+            d,
+            P,
             np.empty(M),
             np.empty((M, N)),
             nu,

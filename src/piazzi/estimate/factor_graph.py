@@ -102,7 +102,7 @@ class FactorGraph:
         if self._bank is not None:
             outcome = search(self._bank, chain, solver, inputs, outcome, self.tolerance)
         nu, S = chain.innovations()
-        details = outcome.details | {"start": used, "first_state": chain.x[0].copy()}
+        details = outcome.details | {"start": used, "first_state": chain.x[0].copy(), "residuals": chain.residuals()}
         if isinstance(chain, RobustChain):
             details |= {"loss": str(self.loss), "weights": chain.weights}
         failure = outcome.failure or undetermined(problem, outcome.covariance[0], chain.x)

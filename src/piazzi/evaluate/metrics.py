@@ -207,3 +207,22 @@ def _persists(error: Array, columns: Sequence[Sequence[int]]) -> bool:
         if earlier is not None and later is not None:
             sizes.append((earlier, later))
     return bool(sizes) and all(later >= 0.5 * earlier for earlier, later in sizes)
+
+
+def residual_rms(estimate: Estimate) -> dict[str, float]:
+    """Root mean square of measurement minus estimate of every component, by name; empty where the estimator kept none.
+
+    Components of the same name, at several stations, are taken together.
+    """
+    residuals = estimate.details.get("residuals")
+    if residuals is None:
+        return {}
+    problem = estimate.problem
+    station = estimate.tracking.stations_of(problem)
+    found: dict[str, list[Array]] = {}
+    for s, place in enumerate(problem.stations):
+        rows = residuals[station == s]
+        for i, component in enumerate(problem.model.sensor(place.sensor).components):
+            found.setdefault(component, []).append(rows[:, i][~np.isnan(rows[:, i])])
+    together = {name: np.concatenate(values) for name, values in found.items()}
+    return {name: float(np.sqrt((v**2).mean())) for name, v in together.items() if v.size}

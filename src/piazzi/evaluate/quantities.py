@@ -58,8 +58,11 @@ def with_sigma(value: float, sigma: float) -> tuple[str, str]:
     if not (isfinite(value) and isfinite(sigma)) or sigma <= 0:
         return number(value, 6), number(sigma, 2)
     decimals = 1 - floor(log10(float(f"{sigma:.1e}")))
-    if decimals > 12 or abs(value) >= 1e12 or sigma >= 1e9:
+    if decimals > 12:
         return number(value, 6), number(sigma, 2)
+    if abs(value) >= 1e12 or sigma >= 1e9:
+        digits = decimals + 1 + floor(log10(abs(value))) if value else 2
+        return number(value, min(max(digits, 2), 16)), number(sigma, 2)
     return f"{value:.{max(decimals, 0)}f}", f"{sigma:.{max(decimals, 0)}f}"
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.estimate import Estimate, Forecast
-from piazzi.evaluate.metrics import errors
+from piazzi.evaluate.metrics import errors, residual_rms
 from piazzi.evaluate.quantities import display_of, duration, number, printable, with_sigma
 from piazzi.problem import Problem, Tracking
 
@@ -63,6 +63,18 @@ def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
             texts.append(with_sigma(e, sigma * show.factor)[0] if np.isfinite(e) else "-")
         table.add_row(Text(state), *texts, Text(printable(show.unit)))
     return Group(Text(printable(title), style="bold"), table)
+
+
+def residual_line(estimate: Estimate) -> list[Any]:
+    """One line with what is left of the measurements, by component; none where the estimator kept no residuals."""
+    from rich.text import Text
+
+    units = {c: unit for s in estimate.problem.model.sensors for c, unit in dict(s.units).items()}
+    parts = []
+    for name, value in residual_rms(estimate).items():
+        show = display_of(units[name], [value])
+        parts.append(f"{name} {number(value * show.factor, 3)}{show.suffix}")
+    return [Text(printable(f"Left over (RMS): {', '.join(parts)}"))] if parts else []
 
 
 def forecast_table(name: str, forecast: Forecast) -> Any:
