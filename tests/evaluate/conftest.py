@@ -31,5 +31,11 @@ def made(
 
 
 @pytest.fixture
+def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same source without compiling it, for models that only one test has."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+
+
+@pytest.fixture
 def make_estimate() -> MakeEstimate:
     return made

@@ -10,14 +10,19 @@ import pytest
 
 import piazzi as pz
 from piazzi.estimate import Estimate
-from piazzi.evaluate import Comparison, compare, evaluate
+from piazzi.evaluate import Comparison, compare, evaluate, posterior_bounds
 from piazzi.scenarios import load_scenario
 from tests.evaluate.conftest import made
 
 ROW = {
     "estimator", "view", "success", "message", "iterations", "seconds", "position_rmse", "velocity_rmse",
     "position_rmse_last_half", "velocity_rmse_last_half", "mean_nees", "mean_nees_last_half", "mean_nis", "diverged",
+    "position_crlb", "velocity_crlb", "position_crlb_last_half", "velocity_crlb_last_half", "convergence_time",
+    "nees_low", "nees_high", "nees_last_half_low", "nees_last_half_high", "nees_effective_epochs",
+    "nis_low", "nis_high", "whiteness", "whiteness_high", "bias", "bias_high",
 }  # fmt: skip
+ERRORS = {k for k in ROW if any(word in k for word in ("rmse", "nees", "crlb", "convergence"))}  # not known without truth
+pytestmark = pytest.mark.usefixtures("uncompiled")
 POSITION = {"position": ["a", "b"]}
 
 
@@ -75,7 +80,7 @@ def test_further_groups_have_their_own_keys(good):
     model = replace(good.problem.model, groups={"clock": ["b"]})
     estimate = replace(good, problem=replace(good.problem, model=model))
     (row,) = strict(compared(good=estimate).to_json())["rows"]
-    assert set(row) == ROW | {"clock_rmse", "clock_rmse_last_half"}
+    assert set(row) == ROW | {"clock_rmse", "clock_rmse_last_half", "clock_crlb", "clock_crlb_last_half"}
     assert row["position_rmse"] is None
 
 
@@ -90,7 +95,7 @@ def test_without_truth_errors_are_null_and_the_rest_stands(good):
     comparison = compared(good=bare)
     (row,) = strict(comparison.to_json())["rows"]
     assert row["success"] is True
-    assert {k for k, v in row.items() if v is None} == {k for k in ROW if "rmse" in k or "nees" in k}
+    assert {k for k, v in row.items() if v is None} == ERRORS
     assert "no truth to compare with" in str(comparison)
 
 
@@ -143,7 +148,8 @@ def test_a_tracking_that_does_not_fit_is_refused_at_the_door(good):
 
 
 def test_evaluate_alone_gives_the_same_row(good):
-    assert evaluate("good", good) == compared(good=good).rows[0]
+    bounds = posterior_bounds(good.problem, good.tracking)
+    assert evaluate("good", good, bounds) == compared(good=good).rows[0]
 
 
 def test_the_failed_estimators_of_the_registry_have_all_their_views():
@@ -158,6 +164,46 @@ def test_the_failed_estimators_of_the_registry_have_all_their_views():
     Broken.__module__, Broken.__qualname__ = pz.FactorGraph.__module__, pz.FactorGraph.__qualname__
     rows = compare(scenario.problem, tracking, {"graph": Broken()}).rows
     assert [(r.view, r.success) for r in rows] == [("delayed", False)]
+
+
+def test_bounds_and_tests_stand_beside_errors(good):
+    """The row has what the functions behind it say; without them, as in a quick look, it has none."""
+    comparison = compared(good=good)
+    (row,) = comparison.rows
+    bounds = posterior_bounds(good.problem, good.tracking)
+    assert row.crlb["position"] == pytest.approx(np.sqrt(np.trace(bounds.realtime, axis1=1, axis2=2).mean()))
+    assert row.crlb_last_half["position"] == pytest.approx(np.sqrt(np.trace(bounds.realtime[20:], axis1=1, axis2=2).mean()))
+    assert row.honesty.nis.statistic == pytest.approx(row.mean_nis)
+    assert row.honesty.nees_last_half.statistic == pytest.approx(row.mean_nees_last_half)
+    quick = compare(good.problem, good.tracking, {"good": Ready(good)}, thorough=False).rows[0]
+    assert (quick.crlb, quick.honesty.nis) == ({}, None)
+    assert quick.rmse == row.rmse
+
+
+def test_tests_that_fail_are_named(good):
+    comparison = compared(good=good, loud=replace(good, innovations=3 * good.innovations))
+    assert comparison.rows[0].honesty.nis.passed
+    assert not comparison.rows[1].honesty.nis.passed
+    text = rendered(comparison, 250)
+    assert re.search(r"^loud .* NIS ", text, re.M)
+    assert re.search(r"Test of .*NIS.* not passed by loud", text)
+
+
+def test_dataset_has_every_number_with_its_unit(good):
+    data = compared(good=good).to_dataset()
+    assert data["position_rmse"].item() == compared(good=good).rows[0].rmse["position"]
+    assert data["position_crlb"].attrs["units"] == "m"
+    assert data["estimator"].values.tolist() == ["good"]
+    assert np.isnan(data["velocity_rmse"].item())
+
+
+def test_many_epochs_do_without_the_bound(good, monkeypatch):
+    monkeypatch.setattr("piazzi.evaluate.comparison.LONGEST", 40)
+    monkeypatch.setattr("piazzi.evaluate.honesty.LONGEST", 40)
+    (row,) = strict(compared(good=good).to_json())["rows"]
+    assert row["position_rmse"] > 0
+    assert row["position_crlb"] is None
+    assert row["nees_low"] is None
 
 
 # ---- how it looks --------------------------------------------------------------------------------------------------------

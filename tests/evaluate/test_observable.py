@@ -50,12 +50,6 @@ def test_without_process_noise_it_is_the_stacked_whitened_jacobian():
     assert found.without_noise is None
 
 
-@pytest.fixture
-def uncompiled(monkeypatch):
-    """The same source without compiling it, for models that only one test has."""
-    monkeypatch.setenv("PIAZZI_JIT", "0")
-
-
 @pytest.mark.usefixtures("uncompiled")
 def test_rows_of_one_epoch_with_full_noise_are_whitened_together():
     problem = network(np.random.default_rng(5), process_noise=pz.ProcessNoise(np.zeros(4), "step"))

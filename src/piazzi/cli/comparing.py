@@ -17,17 +17,23 @@ _LONG = 200_000  # epochs times estimators from which a run takes long enough to
 
 
 def run_comparison(
-    source: str, estimators: Mapping[str, Estimator], seed: int, scenario: str | None, *, bar: bool = False
+    source: str,
+    estimators: Mapping[str, Estimator],
+    seed: int,
+    scenario: str | None,
+    *,
+    bar: bool = False,
+    thorough: bool = True,
 ) -> tuple[str, Comparison]:
     """The source's name and the comparison of these estimators on it; raises as `piazzi.loading` and `piazzi.compare` do.
 
-    A bar of progress is shown for long runs, and where it is asked for.
+    A bar of progress is shown for long runs, and where it is asked for; `thorough` is for `compare`.
     """
     from piazzi.evaluate import compare
 
     found = load_source(source, seed, scenario)
     with output.progress(len(estimators), long=bar or len(found.tracking.times) * len(estimators) > _LONG) as step:
-        comparison = compare(found.problem, found.tracking, estimators, source=found.name, announce=step)
+        comparison = compare(found.problem, found.tracking, estimators, source=found.name, announce=step, thorough=thorough)
     _warn_of_steps(found, comparison, estimators)
     return found.name, comparison
 

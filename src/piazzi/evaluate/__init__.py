@@ -1,22 +1,32 @@
 """How good an estimate is, and whether it knows: errors, consistency, comparison, window lengths, observability."""
 
-from piazzi.evaluate.comparison import Comparison, Row, compare, evaluate
+from piazzi.evaluate.bounds import Bounds, posterior_bounds
+from piazzi.evaluate.comparison import Comparison, compare
+from piazzi.evaluate.consistency import Check, epoch_bounds
+from piazzi.evaluate.honesty import Honesty, judged
 from piazzi.evaluate.metrics import errors, has_diverged, nees, nis, rmse
 from piazzi.evaluate.observable import Observability, observability
+from piazzi.evaluate.rows import Row, evaluate
 from piazzi.evaluate.window_trade import WindowTrade, windows
 
 __all__ = [
+    "Bounds",
+    "Check",
     "Comparison",
+    "Honesty",
     "Observability",
     "Row",
     "WindowTrade",
     "compare",
+    "epoch_bounds",
     "errors",
     "evaluate",
     "has_diverged",
+    "judged",
     "nees",
     "nis",
     "observability",
+    "posterior_bounds",
     "rmse",
     "windows",
 ]

@@ -39,6 +39,8 @@ class Linearized:
 
     Attributes
     ----------
+    first : (n,), the prior mean at the first epoch
+    ahead : (K - 1, n), where the dynamics take each state by the next epoch
     Phi : (K - 1, n, n), from each epoch to the next
     noise : (K - 1, n, n), process noise of those intervals
     predicted, updated, smoothed : (K, n, n), covariances before and after the measurements of each epoch, and given all
@@ -47,6 +49,8 @@ class Linearized:
     whitened : (J, m), standardised innovations, white and of unit variance where the model holds; NaN where missing
     """
 
+    first: Array
+    ahead: Array
     Phi: Array
     noise: Array
     predicted: Array
@@ -101,9 +105,12 @@ def linearized(problem: Problem, tracking: Tracking, states: Array) -> Linearize
         rows = np.diff(inputs.first_row)
         predicted, d = chain.P_pred[skip:], chain.d_pred[skip:]
         whitened, updated, deviation = absorb(predicted, d, chain.nu, chain.H, inputs.first_row[:-1], rows)
-    noise = chain.Q_all[: len(nodes.t) - 1] if problem.noise_varies else _scaled(problem, nodes.scale)
+    last = nodes.epochs - 1
+    noise = chain.Q_all[:last] if problem.noise_varies else _scaled(problem, nodes.scale)
     return Linearized(
-        chain.Phi[skip : len(nodes.t) - 1],
+        chain.f[0] if skip else problem.mean,
+        chain.f[skip:last],
+        chain.Phi[skip:last],
         noise[skip:],
         predicted,
         updated,
@@ -112,6 +119,15 @@ def linearized(problem: Problem, tracking: Tracking, states: Array) -> Linearize
         states + deviation,
         whitened.reshape(-1, M),
     )
+
+
+def linearized_rows(problem: Problem, tracking: Tracking, states: Array) -> tuple[Array, Array]:
+    """Innovations (J, m) and Jacobians (J, m, n) at states (K, n), in units of the noise, NaN innovations where missing."""
+    chain = Chain(problem, prepare(problem, tracking))
+    chain.x[:] = states
+    with np.errstate(all="ignore"):
+        chain.linearize()
+    return chain.nu, chain.H
 
 
 def _scaled(problem: Problem, scale: Array) -> Array:

@@ -5,19 +5,18 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from piazzi.estimate import Estimate, Estimator
 from piazzi.estimate.inputs import prepare
 from piazzi.estimate.registry import views_of
+from piazzi.evaluate.bounds import Bounds, posterior_bounds
 from piazzi.evaluate.display import html, render
 from piazzi.evaluate.grids import as_text
-from piazzi.evaluate.metrics import diverged, groups, known_truth, nis, rmse, squared_in_sigmas
-from piazzi.evaluate.quantities import finite
+from piazzi.evaluate.honesty import LONGEST
+from piazzi.evaluate.rows import Row, evaluate
 from piazzi.problem import Problem, Tracking
 
 if TYPE_CHECKING:
@@ -26,61 +25,6 @@ if TYPE_CHECKING:
 
 LOGGER = logging.getLogger("piazzi.evaluate")
 SCHEMA = "piazzi.compare/1"
-_ALWAYS = ("position", "velocity")  # groups that every row has, None where the model does not name them
-
-
-@dataclass(frozen=True)
-class Row:
-    """One estimate's account of itself, SI units; None where there is no truth to compare with, or nothing to report.
-
-    `rmse` and `rmse_last_half` hold one number for each group of states; the last half is rows K//2 onward.
-    """
-
-    estimator: str
-    view: str
-    success: bool
-    message: str
-    iterations: int
-    seconds: float | None
-    rmse: Mapping[str, float | None] = field(default_factory=dict)
-    rmse_last_half: Mapping[str, float | None] = field(default_factory=dict)
-    mean_nees: float | None = None
-    mean_nees_last_half: float | None = None
-    mean_nis: float | None = None
-    diverged: bool = False
-
-    def to_dict(self) -> dict[str, Any]:
-        """The row in the contract's names, numbers that are not finite as None."""
-        names = [*_ALWAYS, *(g for g in self.rmse if g not in _ALWAYS)]
-        out: dict[str, Any] = {k: getattr(self, k) for k in ("estimator", "view", "success", "message", "iterations")}
-        out["seconds"] = finite(self.seconds)
-        out |= {f"{g}_rmse": finite(self.rmse.get(g)) for g in names}
-        out |= {f"{g}_rmse_last_half": finite(self.rmse_last_half.get(g)) for g in names}
-        out |= {k: finite(getattr(self, k)) for k in ("mean_nees", "mean_nees_last_half", "mean_nis")}
-        return out | {"diverged": self.diverged}
-
-
-def evaluate(name: str, estimate: Estimate) -> Row:
-    """How good the estimate is, and whether its covariance says so."""
-    last = slice(len(estimate.mean) // 2, None)
-    columns, truth = groups(estimate), known_truth(estimate)
-    known = None if truth is None else ~np.isnan(truth)
-    error = None if truth is None else estimate.mean - truth
-    consistency = None if error is None or known is None else squared_in_sigmas(error, estimate.covariance, known)
-    return Row(
-        estimator=name,
-        view=estimate.view,
-        success=estimate.success,
-        message=estimate.message,
-        iterations=int(estimate.iterations),
-        seconds=estimate.seconds,
-        rmse={g: rmse(error, c, known=known) for g, c in columns.items()},
-        rmse_last_half={g: rmse(error, c, last, known) for g, c in columns.items()},
-        mean_nees=consistency.mean() if consistency else None,
-        mean_nees_last_half=consistency.mean(last) if consistency else None,
-        mean_nis=nis(estimate).mean(),
-        diverged=diverged(estimate, error, consistency),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +93,7 @@ def compare(
     *,
     source: str = "",
     announce: Callable[[str], None] | None = None,
+    thorough: bool = True,
 ) -> Comparison:
     """Run each estimator on the same tracking; one that fails keeps a row that says why, and the others theirs.
 
@@ -159,6 +104,7 @@ def compare(
     estimators : mapping of the name to show to the estimator
     source : where the measurements came from, for the record
     announce : called with each name before its estimator starts
+    thorough : whether to find the Cramer-Rao bound and to make the tests of honesty too, for which the problem is linearised
 
     Raises
     ------
@@ -166,6 +112,7 @@ def compare(
         Where the tracking does not fit the problem, so that no estimator could run.
     """
     prepare(problem, tracking)
+    bounds = bounds_of(problem, tracking) if thorough else None
     rows: list[Row] = []
     estimates: dict[str, Estimate] = {}
     for name, estimator in estimators.items():
@@ -173,7 +120,7 @@ def compare(
             announce(name)
         try:
             estimate = estimator.estimate(problem, tracking)
-            found = [evaluate(name, e) for e in (estimate, estimate.delayed) if e is not None]
+            found = [evaluate(name, e, bounds, thorough=thorough) for e in (estimate, estimate.delayed) if e is not None]
         except Exception as error:
             LOGGER.debug("%s failed", name, exc_info=True)
             found = failed(name, estimator, error)
@@ -181,6 +128,11 @@ def compare(
             estimates[name] = estimate
         rows += found
     return Comparison(problem, tracking, tuple(rows), MappingProxyType(estimates), source)
+
+
+def bounds_of(problem: Problem, tracking: Tracking) -> Bounds | None:
+    """Cramer-Rao bounds at the truth; None without truth, where they are not finite, and for more than 300,000 epochs."""
+    return posterior_bounds(problem, tracking) if len(tracking.times) <= LONGEST else None
 
 
 def failed(name: str, estimator: Estimator, error: Exception) -> list[Row]:

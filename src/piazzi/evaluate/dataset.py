@@ -14,8 +14,9 @@ from piazzi.problem.checks import Array
 if TYPE_CHECKING:
     import xarray
 
-    from piazzi.evaluate.comparison import Comparison, Row
+    from piazzi.evaluate.comparison import Comparison
     from piazzi.evaluate.observable import Observability
+    from piazzi.evaluate.rows import Row
     from piazzi.evaluate.window_trade import WindowTrade
 
 

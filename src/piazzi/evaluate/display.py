@@ -15,9 +15,12 @@ from piazzi.model import Model
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
 
-    from piazzi.evaluate.comparison import Comparison, Row
+    from piazzi.evaluate.comparison import Comparison
+    from piazzi.evaluate.consistency import Check
+    from piazzi.evaluate.rows import Row
 
 _VIEW = {"realtime": "real time", "delayed": "delayed"}
+TESTS, PASSED, BOUND = "tests failed", "none", "bound"
 _TEXT_COLUMNS = 2  # name and view, before the numbers
 
 
@@ -58,6 +61,8 @@ def columns(comparison: Comparison) -> list[Column]:
         for part, values in (("whole run", [r.rmse for r in rows]), ("last half", [r.rmse_last_half for r in rows])):
             shown = (number(_times(v.get(group), show.factor)) for v in values)
             found.append(Column(f"{printable(group)} RMSE", part, printable(show.unit), tuple(shown)))
+        bounds = (number(_times(r.crlb_last_half.get(group), show.factor)) for r in rows)
+        found.append(Column(f"{printable(group)} {BOUND}", "last half", printable(show.unit), tuple(bounds)))
     ideal_nis = number(expected_nis(comparison), 3)
     found += [
         Column("mean NEES", "whole run", f"ideal {comparison.problem.model.n}", tuple(number(r.mean_nees, 3) for r in rows)),
@@ -68,11 +73,28 @@ def columns(comparison: Comparison) -> list[Column]:
             tuple(number(r.mean_nees_last_half, 3) for r in rows),
         ),
         Column("mean NIS", "", f"ideal {ideal_nis}", tuple(number(r.mean_nis, 3) for r in rows)),
+        Column(TESTS, "", "5 % each", tuple(", ".join(failing(r)) or (PASSED if tested(r) else "") for r in rows)),
         Column("iterations", "", "", tuple(str(r.iterations) if r.iterations else NOTHING for r in rows)),
         Column("time", "", "", tuple(duration(r.seconds) for r in rows)),
         Column("", "", "", tuple(_remark(r) for r in rows)),
     ]
     return [c for i, c in enumerate(found) if i < _TEXT_COLUMNS or any(v not in ("", NOTHING) for v in c.texts)]
+
+
+def tested(row: Row) -> bool:
+    """Whether there is any test of this row."""
+    return any(check is not None for check in _checks(row).values())
+
+
+def failing(row: Row) -> list[str]:
+    """Names of the tests that a row does not pass."""
+    return [name for name, check in _checks(row).items() if check is not None and not check.passed]
+
+
+def _checks(row: Row) -> dict[str, Check | None]:
+    """The tests that are shown, by the name that they are shown under: NEES once the estimator has settled."""
+    h = row.honesty
+    return {"NEES": h.nees_last_half, "NIS": h.nis, "whiteness": h.whiteness, "bias": h.bias}
 
 
 def _times(value: float | None, factor: float) -> float | None:
@@ -102,14 +124,16 @@ def html(comparison: Comparison) -> str:
 def render(comparison: Comparison, console: Console, options: ConsoleOptions) -> RenderResult:
     """The comparison for rich, then its sentences.
 
-    All columns where they fit the width; else those of the last half; else a block of lines for each row.
+    All columns where they fit the width; else those of the last half; else without bounds and tests; else a block of lines for
+    each row.
     """
     from rich.measure import Measurement
     from rich.text import Text
 
     everything = columns(comparison)
     fewer = [c for c in everything if c.part != "whole run" and c.name != "iterations"]
-    for chosen in (everything, fewer):
+    least = [c for c in fewer if c.name != TESTS and not c.name.endswith(BOUND)]
+    for chosen in (everything, fewer, least):
         table = wide_table(chosen)
         if Measurement.get(console, options.update(max_width=10_000), table).maximum <= options.max_width:
             yield table
@@ -174,7 +198,22 @@ def sentences(comparison: Comparison) -> list[str]:
         out += [*_best(comparison, sound), *_honest(comparison, sound)]
     elif sound:
         out += _without_truth(comparison, sound)
-    return [printable(line) for line in out]
+    return [printable(line) for line in [*out, *_tested(sound)]]
+
+
+def _tested(rows: Sequence[Row]) -> list[str]:
+    """Who did not pass which tests, and that the others did."""
+    judged = [r for r in rows if tested(r)]
+    found: dict[str, list[str]] = {}
+    for row in judged:
+        if failing(row):
+            found.setdefault(_list(failing(row)), []).append(_named(row, rows))
+    out = [f"Test of {wrong} not passed by {_list(names)} (5 % level)." for wrong, names in found.items()]
+    passed = [_named(r, rows) for r in judged if not failing(r)]
+    if not passed:
+        return out
+    who = "All others pass" if out else f"{passed[0]} passes" if len(passed) == 1 else "All pass"
+    return [*out, f"{who} all tests of honesty (NEES, NIS, whiteness, bias; 5 % level)."]
 
 
 def _without_truth(comparison: Comparison, rows: Sequence[Row]) -> list[str]:

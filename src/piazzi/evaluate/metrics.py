@@ -75,6 +75,22 @@ def rmse(error: Array | None, columns: Sequence[int], rows: slice = slice(None),
     return float(np.sqrt(np.einsum("ki,ki->", part, part) / len(part))) if len(part) else None
 
 
+def convergence_time(error: Array, columns: Sequence[int], times: Array) -> float | None:
+    """Seconds from the first epoch until the error (K, n) in these columns has come down, None where it is never finite.
+
+    From then on, the root of the mean square of all errors that follow is at most twice that of the last half (rows K//2
+    onward).  Epochs without an error are left out.
+    """
+    part = error[:, list(columns)]
+    squared = np.einsum("ki,ki->k", part, part)
+    there = np.isfinite(squared)
+    half = squared[len(squared) // 2 :][there[len(squared) // 2 :]]
+    if not half.size:
+        return None
+    rest = np.cumsum(squared[there][::-1])[::-1] / np.arange(int(there.sum()), 0, -1)
+    return float(times[there][np.argmax(rest <= 4.0 * half.mean())] - times[0])
+
+
 def nees(estimate: Estimate) -> Consistency | None:
     """Normalised estimation error squared, e^T P^-1 e, of every epoch, (K,); None without truth."""
     truth = known_truth(estimate)
@@ -83,12 +99,17 @@ def nees(estimate: Estimate) -> Consistency | None:
 
 def nis(estimate: Estimate) -> Consistency:
     """Normalised innovation squared, nu^T S^-1 nu, of every row of measurements, (J,), over the components that are there."""
-    measured = ~np.isnan(estimate.tracking.padded(estimate.innovations.shape[1]))
+    return squared_in_sigmas(estimate.innovations, estimate.innovation_covariances, used(estimate))
+
+
+def used(estimate: Estimate) -> Array:
+    """Which components of which rows are there and were used, (J, m)."""
+    measured: Array = ~np.isnan(estimate.tracking.padded(estimate.innovations.shape[1]))
     if "rejected" in estimate.details:  # a gate's outliers say nothing about what the filter used
         measured &= ~np.asarray(estimate.details["rejected"], dtype=bool)[:, None]
     if "weights" in estimate.details:  # nor do those of a loss; hardly a good row gets so small a weight
         measured &= np.asarray(estimate.details["weights"])[:, None] >= _OUTLIER
-    return squared_in_sigmas(estimate.innovations, estimate.innovation_covariances, measured)
+    return measured
 
 
 def squared_in_sigmas(e: Array, P: Array, present: Array) -> Consistency:

@@ -11,9 +11,11 @@ import numpy as np
 
 from piazzi.estimate import FactorGraph, SlidingWindow
 from piazzi.estimate.inputs import prepare
-from piazzi.evaluate.comparison import Row, evaluate, failed
+from piazzi.evaluate.bounds import Bounds
+from piazzi.evaluate.comparison import bounds_of, failed
 from piazzi.evaluate.grids import as_text
 from piazzi.evaluate.quantities import finite
+from piazzi.evaluate.rows import Row, evaluate
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 
@@ -105,6 +107,11 @@ class WindowTrade:
         rows = [row.mean_nees_last_half if last_half else row.mean_nees for row in self.rows(view)]
         return np.array([np.nan if v is None else v for v in rows])
 
+    def crlb(self, group: str, view: str = "realtime", *, last_half: bool = True) -> float | None:
+        """Posterior Cramer-Rao bound of the RMSE of a group, the same for all lengths; None where it is not known."""
+        row = next((r for r in self.rows(view) if r.crlb), None)
+        return None if row is None else (row.crlb_last_half if last_half else row.crlb).get(group)
+
     def to_dict(self) -> dict[str, Any]:
         """The object of schema piazzi.windows/1."""
         return {
@@ -184,14 +191,15 @@ def windows(
         raise ValueError("there are no window lengths to try")
     sizes = {lag: SlidingWindow(lag, iterations) for lag in sorted(set(lags))}
     say = announce or (lambda _: None)
+    bounds = bounds_of(problem, tracking)
     pairs = []
     for lag, window in sizes.items():
         say(f"window:{lag}")
-        pairs.append(_window(window, problem, tracking))
+        pairs.append(_window(window, problem, tracking, bounds))
     row, timing = None, None
     if graph:
         say("graph")
-        row = _graph(problem, tracking)
+        row = _graph(problem, tracking, bounds)
         timing = graph_timing(problem, tracking, say)
         row = replace(row, seconds=float(timing.seconds[-1]) if row.success else row.seconds)
     realtime, delayed = (tuple(pair[i] for pair in pairs) for i in range(2))
@@ -203,13 +211,13 @@ def steps_of(lags: Sequence[int], tracking: Tracking, *, graph: bool = True) -> 
     return len(set(lags)) + (1 + len(timed_sizes(len(tracking.times))) if graph else 0)
 
 
-def _window(window: SlidingWindow, problem: Problem, tracking: Tracking) -> tuple[Row, Row]:
+def _window(window: SlidingWindow, problem: Problem, tracking: Tracking, bounds: Bounds | None) -> tuple[Row, Row]:
     """Real-time and delayed row of one window; one that raises has rows that say why."""
     name = f"window:{window.lag}" + (f"x{window.iterations}" if window.iterations > 1 else "")
     try:
         estimate = window.estimate(problem, tracking)
         assert estimate.delayed is not None
-        rows = [evaluate(name, estimate), evaluate(name, estimate.delayed)]
+        rows = [evaluate(name, e, bounds) for e in (estimate, estimate.delayed)]
         best = estimate.seconds
         for _ in range(_REPEATS - 1 if best < _LONG else 0):
             best = min(best, window.estimate(problem, tracking).seconds)
@@ -219,9 +227,9 @@ def _window(window: SlidingWindow, problem: Problem, tracking: Tracking) -> tupl
     return realtime, delayed
 
 
-def _graph(problem: Problem, tracking: Tracking) -> Row:
+def _graph(problem: Problem, tracking: Tracking, bounds: Bounds | None) -> Row:
     try:
-        return evaluate("graph", FactorGraph().estimate(problem, tracking))
+        return evaluate("graph", FactorGraph().estimate(problem, tracking), bounds)
     except Exception as error:
         return failed("graph", FactorGraph(), error)[0]
 

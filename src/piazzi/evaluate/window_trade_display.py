@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.evaluate.display import row_display
+from piazzi.evaluate.display import PASSED, failing, row_display, tested
 from piazzi.evaluate.grids import Grid, as_html, as_rich
 from piazzi.evaluate.quantities import duration, number
 from piazzi.problem.checks import Array
@@ -96,6 +96,9 @@ def _trade(trade: WindowTrade) -> Grid:
     heads += ["mean NIS", "per step"]
     columns.append(["-" if r.mean_nis is None else number(r.mean_nis, 3) for r in trade.realtime])
     columns.append([duration(float(us) * 1e-6) for us in trade.microseconds_per_step])
+    if any(map(tested, trade.realtime)):
+        heads.append("tests failed\nreal time\n(5 % each)")
+        columns.append([", ".join(failing(r)) or PASSED if tested(r) else "-" for r in trade.realtime])
     remarks = ["FAILED" if not r.success else "diverged" if r.diverged else "" for r in trade.realtime]
     if any(remarks):
         heads.append("")
@@ -103,6 +106,8 @@ def _trade(trade: WindowTrade) -> Grid:
     cells = [tuple(row) for row in zip(*columns, strict=True)]
     if trade.graph is not None:
         cells.append(_graph(trade, len(heads)))
+    if any(row.crlb for row in trade.realtime):
+        cells.append(_bound(trade, len(heads)))
     return Grid("Sliding windows, last half of the run", tuple(heads), tuple(cells), left=0)
 
 
@@ -118,7 +123,19 @@ def _graph(trade: WindowTrade, width: int) -> tuple[str, ...]:
         cells += ["-", number(row.mean_nees_last_half, 3)]
     per_step = None if row.seconds is None else row.seconds / len(trade.tracking.times)
     cells += [number(row.mean_nis, 3), duration(per_step)]
-    return (*cells, *(["FAILED" if not row.success else ""] * (width - len(cells))))
+    cells += [""] * (width - len(cells))
+    return (*cells[:-1], "FAILED") if not row.success else tuple(cells)
+
+
+def _bound(trade: WindowTrade, width: int) -> tuple[str, ...]:
+    """The line of the Cramer-Rao bound."""
+    rows, cells = [*trade.realtime, *trade.delayed, *([trade.graph] if trade.graph else [])], ["bound"]
+    for group in trade.groups:
+        show = row_display(trade.problem.model, rows, group)
+        for view in ("realtime", "delayed"):
+            value = trade.crlb(group, view)
+            cells.append(number(None if value is None else value * show.factor))
+    return (*cells, *("-" for _ in range(width - len(cells))))
 
 
 def _texts(values: Array, digits: int) -> list[str]:

@@ -1,0 +1,127 @@
+"""One estimate's account of itself: errors beside the best possible, honesty, cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from piazzi.estimate import Estimate
+from piazzi.evaluate.bounds import Bounds
+from piazzi.evaluate.consistency import Check
+from piazzi.evaluate.honesty import Honesty, judged
+from piazzi.evaluate.metrics import convergence_time, diverged, groups, known_truth, nis, rmse, squared_in_sigmas
+from piazzi.evaluate.quantities import finite
+
+_ALWAYS = ("position", "velocity")  # groups that every row has, None where the model does not name them
+
+
+@dataclass(frozen=True)
+class Row:
+    """One estimate's account of itself, SI units; None where there is no truth to compare with, or nothing to report.
+
+    Attributes
+    ----------
+    rmse, rmse_last_half : one number for each group of states; the last half is rows K//2 onward
+    crlb, crlb_last_half : the posterior Cramer-Rao bound of the same, for this view and this truth: no estimator that is
+        unbiased does better on average, a single run may
+    mean_nees, mean_nees_last_half, mean_nis : honesty; near n, n and the number of components per row
+    honesty : Honesty, tests of that with bounds
+    convergence_time : seconds until the error of the first group stays, in the RMS of all that follows, within twice its last
+        half's
+    diverged : see `piazzi.evaluate.has_diverged`
+    """
+
+    estimator: str
+    view: str
+    success: bool
+    message: str
+    iterations: int
+    seconds: float | None
+    rmse: Mapping[str, float | None] = field(default_factory=dict)
+    rmse_last_half: Mapping[str, float | None] = field(default_factory=dict)
+    mean_nees: float | None = None
+    mean_nees_last_half: float | None = None
+    mean_nis: float | None = None
+    diverged: bool = False
+    crlb: Mapping[str, float | None] = field(default_factory=dict)
+    crlb_last_half: Mapping[str, float | None] = field(default_factory=dict)
+    convergence_time: float | None = None
+    honesty: Honesty = field(default_factory=Honesty)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The row in the contract's names, numbers that are not finite as None."""
+        names = [*_ALWAYS, *(g for g in self.rmse if g not in _ALWAYS)]
+        out: dict[str, Any] = {k: getattr(self, k) for k in ("estimator", "view", "success", "message", "iterations")}
+        out["seconds"] = finite(self.seconds)
+        out |= {f"{g}_rmse": finite(self.rmse.get(g)) for g in names}
+        out |= {f"{g}_rmse_last_half": finite(self.rmse_last_half.get(g)) for g in names}
+        out |= {k: finite(getattr(self, k)) for k in ("mean_nees", "mean_nees_last_half", "mean_nis")}
+        out["diverged"] = self.diverged
+        out |= {f"{g}_crlb": finite(self.crlb.get(g)) for g in names}
+        out |= {f"{g}_crlb_last_half": finite(self.crlb_last_half.get(g)) for g in names}
+        out["convergence_time"] = finite(self.convergence_time)
+        return out | _tests(self.honesty)
+
+
+def _tests(found: Honesty) -> dict[str, float | None]:
+    """Statistics and bounds of the tests as flat numbers."""
+    out: dict[str, float | None] = {}
+    two_sided = {"nees": found.nees, "nees_last_half": found.nees_last_half, "nis": found.nis}
+    for name, check in two_sided.items():
+        out |= {f"{name}_low": None, f"{name}_high": None} if check is None else _bounds(name, check)
+    out["nees_effective_epochs"] = None if found.nees is None else finite(found.nees.effective)
+    for name, check in {"whiteness": found.whiteness, "bias": found.bias}.items():
+        out[name] = None if check is None else finite(check.statistic)
+        out[f"{name}_high"] = None if check is None else finite(check.high)
+    return out
+
+
+def _bounds(name: str, check: Check) -> dict[str, float | None]:
+    return {f"{name}_low": finite(check.low), f"{name}_high": finite(check.high)}
+
+
+def evaluate(name: str, estimate: Estimate, bounds: Bounds | None = None, *, thorough: bool = True) -> Row:
+    """How good the estimate is, and whether its covariance says so.
+
+    Parameters
+    ----------
+    name : of the estimator
+    estimate : Estimate
+    bounds : of the problem at the truth, from `posterior_bounds`; without them the row has no Cramer-Rao bound
+    thorough : whether to make the tests of `Honesty`, for which the problem is linearised about the estimate
+    """
+    last = slice(len(estimate.mean) // 2, None)
+    columns, truth = groups(estimate), known_truth(estimate)
+    known = None if truth is None else ~np.isnan(truth)
+    error = None if truth is None else estimate.mean - truth
+    consistency = None if error is None or known is None else squared_in_sigmas(error, estimate.covariance, known)
+    lost = diverged(estimate, error, consistency)
+    variances = None if bounds is None else np.diagonal(bounds.of(estimate.view), axis1=1, axis2=2)
+    return Row(
+        estimator=name,
+        view=estimate.view,
+        success=estimate.success,
+        message=estimate.message,
+        iterations=int(estimate.iterations),
+        seconds=estimate.seconds,
+        rmse={g: rmse(error, c, known=known) for g, c in columns.items()},
+        rmse_last_half={g: rmse(error, c, last, known) for g, c in columns.items()},
+        mean_nees=consistency.mean() if consistency else None,
+        mean_nees_last_half=consistency.mean(last) if consistency else None,
+        mean_nis=nis(estimate).mean(),
+        diverged=lost,
+        crlb={} if variances is None else {g: _spread(variances[:, list(c)]) for g, c in columns.items()},
+        crlb_last_half={} if variances is None else {g: _spread(variances[last, list(c)]) for g, c in columns.items()},
+        convergence_time=None
+        if lost or error is None
+        else convergence_time(error, next(iter(columns.values())), estimate.times),
+        honesty=judged(estimate, consistency) if thorough else Honesty(),
+    )
+
+
+def _spread(variances: np.ndarray[Any, Any]) -> float:
+    """What an RMSE would be with these variances (K, d)."""
+    return float(np.sqrt(variances.sum(axis=1).mean()))
