@@ -215,6 +215,11 @@ def test_the_best_is_named_with_its_error(comparison):
     text = said(comparison)["Best while measuring"]
     assert text.startswith(best.estimator)
     assert f"{best.rmse_last_half['position'] / 1e3:.4g}" in text
+    rows = [r for r in comparison.rows if r.view == "delayed"]
+    best = min(rows, key=lambda r: r.rmse["position"])
+    text = said(comparison)["Best with all in hand"]
+    assert text.startswith(best.estimator)
+    assert f"{best.rmse['position'] / 1e3:.4g}" in text
 
 
 def test_who_is_not_to_be_trusted_is_named_with_the_reason(comparison):
@@ -239,7 +244,19 @@ def test_without_truth_the_summary_says_so(comparison):
 def test_lists_of_names():
     assert listed(["a"]) == "a"
     assert listed(["a", "b", "a"]) == "a and b"
-    assert listed(["w, late", "b", "c"]) == "w, late; b and c"
+    assert listed(["a", "b", "c"]) == "a, b and c"
+
+
+def test_both_views_of_a_window_are_one_name(comparison):
+    cautious = {"mean_nees": 0.1, "mean_nees_last_half": 0.1}
+    rows = [replace(r, **(cautious if r.estimator in ("ekf", "window:10") else {})) for r in comparison.rows]
+    assert said(replace(comparison, rows=tuple(rows)))["More cautious than needed"].startswith(
+        "Errors of ekf and window:10 are"
+    )
+    rows = [replace(r, **(cautious if (r.estimator, r.view) == ("window:10", "delayed") else {})) for r in comparison.rows]
+    assert said(replace(comparison, rows=tuple(rows)))["More cautious than needed"].startswith(
+        "Errors of window:10 delayed are"
+    )
 
 
 # ---- NIS and colours -----------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from piazzi.evaluate.observable_display import grids, sentences
 from piazzi.evaluate.quantities import Display
 from piazzi.present.colours import STATIONS
 from piazzi.present.figures.style import time_display
-from piazzi.present.report.blocks import Axis, Chart, Line, Point, Section, Tab, Tone
+from piazzi.present.report.blocks import Axis, Chart, Line, Point, Section, Tab, Text, Tone
 from piazzi.present.report.windows import table_of
 from piazzi.present.tables import summary
 
@@ -36,8 +36,8 @@ def observability_tab(found: Observability, *, title: str = "") -> Tab:
 
 def observability_section(found: Observability, *, words: bool = True) -> Section:
     """Singular values and Cramer-Rao sigmas over time, directions, and twins."""
-    intro = " ".join([_INTRO, *(sentences(found) if words else [])])
-    return Section("What can be seen", [_singular_values(found), _sigmas(found), *map(table_of, grids(found))], intro)
+    says = [Text([f"{point.heading}: {point.text}" for point in said(found)])] if words else []
+    return Section("What can be seen", [*says, _singular_values(found), _sigmas(found), *map(table_of, grids(found))], _INTRO)
 
 
 def said(found: Observability) -> list[Point]:

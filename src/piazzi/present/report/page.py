@@ -113,13 +113,14 @@ class _Builder:
             f'<button type="button" class="chip" data-key="{i}" aria-pressed="true">{line_mark(key)}{text(key.label)}</button>'
             for i, key in enumerate(tab.keys)
         )
+        everyone = '<button type="button" class="quiet everyone">Hide all</button>' if len(tab.keys) > 2 else ""
         options = "".join(f'<option value="{i}">{text(key.label)}</option>' for i, key in enumerate(tab.keys))
         focus = f'<label class="focus">Look closely at <select>{options}</select></label>' if tab.keys else ""
         again = '<button type="button" class="quiet unzoom" hidden>Whole run</button>'
         return (
             f'<div class="bar" role="group" aria-label="Time and estimators">'
             f'<div class="move">{play}{slider}{again}{focus}</div>'
-            f'<div class="chips" role="group" aria-label="Estimators shown">{chips}</div></div>'
+            f'<div class="chips" role="group" aria-label="Estimators shown">{chips}{everyone}</div></div>'
         )
 
     def _section(self, section: Section) -> str:

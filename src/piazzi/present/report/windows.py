@@ -12,7 +12,7 @@ from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.quantities import Display
 from piazzi.evaluate.window_trade_display import grids, sentences
 from piazzi.present.colours import COLOURS, DASHES
-from piazzi.present.report.blocks import Axis, Chart, Line, Point, Section, Tab, Table
+from piazzi.present.report.blocks import Axis, Chart, Line, Point, Section, Tab, Table, Text
 from piazzi.present.tables import summary
 from piazzi.problem.checks import Array
 
@@ -32,8 +32,8 @@ def windows_section(trade: WindowTrade, *, words: bool = True) -> Section:
     charts = [*(_errors(trade, group) for group in trade.groups), *([_nees(trade)] if trade.groups else []), _cost(trade)]
     timing = [] if trade.timing is None else [_timing(trade.timing.epochs, trade.timing.seconds)]
     tables = [table_of(grid) for grid in grids(trade)]
-    intro = " ".join([_INTRO, *(sentences(trade) if words else [])])
-    return Section("How long a window has to be", [*charts, *timing, *tables], intro)
+    says = [Text(sentences(trade))] if words else []
+    return Section("How long a window has to be", [*says, *charts, *timing, *tables], _INTRO)
 
 
 def table_of(grid: Grid) -> Table:

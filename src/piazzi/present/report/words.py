@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite
 
 from piazzi.evaluate import Comparison, Row
 from piazzi.evaluate.display import expected_nis, group_display
 from piazzi.evaluate.quantities import duration, number, sigma_factor
-from piazzi.present.colours import label_of
 from piazzi.present.report.blocks import Point
 
 _HEADING = {"realtime": "Best while measuring", "delayed": "Best with all in hand"}
+_PART = {"realtime": "in the last half of the run", "delayed": "over the whole run"}
+_VIEW = {"realtime": "in real time", "delayed": "delayed"}
 _LEVEL = 1.01  # errors nearer than this are called the same
 _HONEST = 1.5  # one run cannot tell a smaller factor
 _FEW = 3  # names that a sentence lists before it counts them
@@ -35,37 +36,38 @@ def points(comparison: Comparison) -> list[Point]:
     return out or [Point("Nothing to show", "No estimator gave a result.", "bad")]
 
 
+def _counted(row: Row) -> Mapping[str, float | None]:
+    """Errors that count for a row: once settled while measuring, over the whole run where all measurements are in hand."""
+    return row.rmse_last_half if row.view == "realtime" else row.rmse
+
+
 def _best(comparison: Comparison, rows: Sequence[Row], view: str) -> list[Point]:
-    group = next((g for r in rows for g, v in r.rmse_last_half.items() if v is not None and isfinite(v)), None)
-    if group is None:
+    group = _first_group(rows)
+    found = [(v, r) for r in rows if (v := _counted(r).get(group)) is not None and isfinite(v)]
+    if not found:
         return []
-    ranked = sorted(
-        ((v, r) for r in rows if (v := r.rmse_last_half.get(group)) is not None and isfinite(v)), key=lambda found: found[0]
-    )
+    ranked = sorted(found, key=lambda pair: pair[0])
     best, first = ranked[0]
     level = [r.estimator for v, r in ranked if v <= _LEVEL * best]
     others = [v for v, _ in ranked[len(level) :]]
-    text = f"{listed(level)}: {_errors(comparison, first)} in the last half of the run"
+    text = f"{listed(level)}: {_errors(comparison, first)} {_PART[view]}"
     if others:
         text += f"; {'the other has' if len(others) == 1 else 'the others have'} {_more(others, best)}"
     elif len(ranked) == 1:
         text += "; there is no other to compare with"
     if others and others[-1] < _HONEST * best:
         text += ", which may be the luck of one run"
-    return [Point(_HEADING[view], f"{text}.{_whole_run(comparison, rows, group, level)}", "good")]
+    return [Point(_HEADING[view], f"{text}.", "good")]
 
 
-def _whole_run(comparison: Comparison, rows: Sequence[Row], group: str, level: Sequence[str]) -> str:
-    """Who is best over the whole run, where that is another one."""
-    found = [(v, r.estimator) for r in rows if (v := r.rmse.get(group)) is not None and isfinite(v)]
-    value, name = min(found, default=(0.0, ""))
-    show = group_display(comparison, group)
-    return f" Over the whole run {name}: {number(value * show.factor)}{show.suffix}." if name and name not in level else ""
+def _first_group(rows: Sequence[Row]) -> str:
+    """The first group of states whose error is known."""
+    return next((g for r in rows for g, v in _counted(r).items() if v is not None and isfinite(v)), "")
 
 
 def _errors(comparison: Comparison, row: Row) -> str:
     parts = []
-    for group, value in row.rmse_last_half.items():
+    for group, value in _counted(row).items():
         if value is not None:
             show = group_display(comparison, group)
             parts.append(f"{group} error {number(value * show.factor)}{show.suffix}")
@@ -86,66 +88,84 @@ def _more(others: Sequence[float], best: float) -> str:
 def _failed(rows: Sequence[Row]) -> list[Point]:
     failed = {r.estimator: r.message for r in rows if not r.success}
     out = [Point("Did not succeed", f"{name}: {message}.", "bad") for name, message in failed.items()]
-    lost = [label_of(r.estimator, r.view) for r in rows if r.success and r.diverged]
+    lost = [r for r in rows if r.success and r.diverged]
     if lost:
-        out.append(Point("Diverged", f"{listed(lost)}: errors stay far beyond the covariance and do not come down.", "bad"))
+        out.append(
+            Point("Diverged", f"{_named(lost, rows)}: errors stay far beyond the covariance and do not come down.", "bad")
+        )
     return out
 
 
 def _honesty(comparison: Comparison, rows: Sequence[Row], known: bool) -> list[Point]:
     """Whose covariance can be taken at its word."""
     n, m = comparison.problem.model.n, expected_nis(comparison)
-    factors: dict[str, float] = {}
+    factors: list[tuple[Row, float]] = []
     for r in rows:
-        value, expected = (r.mean_nees_last_half, float(n)) if known else (r.mean_nis, m)
+        nees = r.mean_nees_last_half if r.view == "realtime" else r.mean_nees
+        value, expected = (nees, float(n)) if known else (r.mean_nis, m)
         if value is not None and isfinite(value) and expected:
-            factors[label_of(r.estimator, r.view)] = sigma_factor(value, expected)
-    what = "errors" if known else "innovations"
-    small = {name: f for name, f in factors.items() if f > _HONEST}
-    large = {name: f for name, f in factors.items() if f < 1 / _HONEST}
-    fair = [name for name in factors if name not in small and name not in large]
+            factors.append((r, sigma_factor(value, expected)))
+    what, judged = "Errors" if known else "Innovations", [r for r, _ in factors]
+    small = [(r, f) for r, f in factors if f > _HONEST]
+    large = [(r, f) for r, f in factors if f < 1 / _HONEST]
+    fair = [r for r, f in factors if 1 / _HONEST <= f <= _HONEST]
     out = []
     if small:
-        text = f"{_with_factors(small)} larger than the covariance says: widen it, or find what the model leaves out."
-        out.append(Point("Too sure of themselves", f"{what.capitalize()} of {text}", "bad"))
+        names, size = _named([r for r, _ in small], judged), _span([f for _, f in small])
+        text = (
+            f"{what} of {names} are {size} times larger than the covariance says: widen it, or find what the model leaves out."
+        )
+        out.append(Point("Too sure of themselves", text, "bad"))
     if fair:
-        names = "all" if len(fair) == len(factors) > 1 else listed(fair)
-        text = f"{what.capitalize()} of {names} are about as large as the covariance says"
-        out.append(Point("Covariance holds", f"{text}, as far as one run can tell.", "good"))
+        text = f"{what} of {_named(fair, judged)} are about as large as the covariance says, as far as one run can tell."
+        out.append(Point("Covariance holds", text, "good"))
     if large:
-        text = f"{_with_factors({k: 1 / f if f > 0 else f for k, f in large.items()})} smaller than the covariance says"
-        out.append(Point("More cautious than needed", f"{what.capitalize()} of {text}, in this one run."))
+        names, size = _named([r for r, _ in large], judged), _span([1 / f if f > 0 else inf for _, f in large])
+        out.append(
+            Point(
+                "More cautious than needed",
+                f"{what} of {names} are {size} times smaller than the covariance says, in this one run.",
+            )
+        )
     return out
 
 
-def _with_factors(found: Mapping[str, float]) -> str:
-    factors = sorted(found.values())
-    low, high = number(factors[0], 2), number(factors[-1], 2)
-    return f"{listed(list(found))} are {low if low == high else f'{low} to {high}'} times"
+def _span(factors: Sequence[float]) -> str:
+    ends = dict.fromkeys(number(v, 2) for v in (min(factors), max(factors)))
+    return " to ".join(ends)
+
+
+def _named(chosen: Sequence[Row], everyone: Sequence[Row]) -> str:
+    """Estimators as a sentence lists them: a window without its view where both are meant, "all but" where few are left out."""
+    left = [r for r in everyone if r not in chosen]
+    if not left and len(everyone) > 1:
+        return "all"
+    if len(left) <= _FEW < len(chosen):
+        return f"all but {_named(left, everyone)}"
+    names = []
+    for row in chosen:
+        both = [r for r in everyone if r.estimator == row.estimator]
+        whole = len(both) == 1 or all(r in chosen for r in both)
+        names.append(row.estimator if whole else f"{row.estimator} {_VIEW[row.view]}")
+    return listed(names)
 
 
 def _settling(comparison: Comparison, rows: Sequence[Row]) -> list[Point]:
     """Who is far off before settling."""
-    group = next((g for r in rows for g, v in r.rmse_last_half.items() if v is not None and isfinite(v)), None)
-    if group is None:
-        return []
-    slow: dict[str, float] = {}
+    rows = [r for r in rows if r.view == "realtime"]
+    group = _first_group(rows)
+    slow, sizes = [], []
     for r in rows:
         whole, late = r.rmse.get(group), r.rmse_last_half.get(group)
         if whole is not None and late is not None and isfinite(whole) and whole > _SETTLING * late:
-            slow[label_of(r.estimator, r.view)] = whole
+            slow.append(r)
+            sizes.append(whole)
     if not slow:
         return []
     show = group_display(comparison, group)
-    sizes = [f"{number(v * show.factor, 3)}{show.suffix}" for v in (min(slow.values()), max(slow.values()))]
-    size = sizes[0] if sizes[0] == sizes[1] else f"{sizes[0]} to {sizes[1]}"
-    text = f"Over the whole run the {group} error of {_or_count(list(slow), len(rows))} is {size} (RMS)"
+    ends = dict.fromkeys(f"{number(v * show.factor, 3)}{show.suffix}" for v in (min(sizes), max(sizes)))
+    text = f"Over the whole run the {group} error of {_named(slow, rows)} is {' to '.join(ends)} (RMS)"
     return [Point("Not before it settles", f"{text}: do not use the first estimates.", "bad")]
-
-
-def _or_count(names: Sequence[str], of: int) -> str:
-    """The names where they are few, else how many of how many."""
-    return listed(names) if len(names) <= _FEW else f"{'all' if len(names) == of else f'{len(names)} of {of}'} estimates"
 
 
 def _cost(rows: Sequence[Row]) -> list[Point]:
@@ -162,9 +182,6 @@ def _cost(rows: Sequence[Row]) -> list[Point]:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names as a sentence lists them; names with commas in them are kept apart by semicolons."""
+    """Names as a sentence lists them."""
     names = list(dict.fromkeys(names))
-    if len(names) < 2:
-        return "".join(names)
-    comma = "; " if any("," in name for name in names) else ", "
-    return f"{comma.join(names[:-1])} and {names[-1]}"
+    return "".join(names) if len(names) < 2 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -16,7 +16,8 @@ class Tab {
     const margin = 0.01 * (last - this.times[0]) || 0.5;
     this.span = [this.times[0] - margin, last + margin];
     const find = (selector) => this.root.querySelector(selector);
-    [this.slider, this.output, this.button, this.select, this.whole] = ["input.time", ".clock", ".play", ".focus select", ".unzoom"].map(find);
+    [this.slider, this.output, this.button] = ["input.time", ".clock", ".play"].map(find);
+    [this.select, this.whole, this.everyone] = [".focus select", ".unzoom", ".everyone"].map(find);
     this.drawings = [...this.root.querySelectorAll(".plot")].map((box) => {
       const drawing = spec.drawings[box.dataset.drawing];
       return new (drawing.kind === "orbit" ? Orbit : Chart)(this, box, drawing);
@@ -37,6 +38,10 @@ class Tab {
     this.whole?.addEventListener("click", () => {
       this.zoomTo(null);
       this.slider?.focus();
+    });
+    this.everyone?.addEventListener("click", () => {
+      this.visible = new Set(this.visible.size ? [] : this.keys.keys());
+      this.refresh();
     });
     this.select?.addEventListener("change", () => {
       this.focus = Number(this.select.value);
@@ -73,6 +78,7 @@ class Tab {
     for (const chip of this.root.querySelectorAll(".chip")) chip.setAttribute("aria-pressed", this.visible.has(Number(chip.dataset.key)));
     for (const row of this.root.querySelectorAll("tr[data-key]")) row.classList.toggle("off", !this.visible.has(Number(row.dataset.key)));
     if (this.select) this.select.value = this.focus;
+    if (this.everyone) this.everyone.textContent = this.visible.size ? "Hide all" : "Show all";
     for (const drawing of this.drawings) drawing.refresh();
   }
 
