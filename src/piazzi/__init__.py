@@ -59,6 +59,7 @@ if TYPE_CHECKING:
         with_gauss_markov,
     )
     from piazzi.simulation import simulate
+    from piazzi.study import Study, read_store
 
 # name -> module; nothing is imported before it is used
 _WHERE = {
@@ -77,6 +78,7 @@ _WHERE = {
     **dict.fromkeys(("Bank", "Cauchy", "Huber", "Tukey"), "piazzi.estimate"),
     **dict.fromkeys(("choose_substeps", "step_warning", "substep_error"), "piazzi.estimate.substeps"),
     **dict.fromkeys(("kepler_transition", "propagate_kepler"), "piazzi.orbit"),
+    **dict.fromkeys(("Study", "read_store"), "piazzi.study"),
     "simulate": "piazzi.simulation",
     "load": "piazzi.loading",
 }
@@ -120,6 +122,7 @@ __all__ = [
     "Smoother",
     "SquareRootKalmanFilter",
     "Station",
+    "Study",
     "Taylor",
     "Tracking",
     "Truth",
@@ -134,6 +137,7 @@ __all__ = [
     "observability",
     "predict",
     "propagate_kepler",
+    "read_store",
     "simulate",
     "step_warning",
     "substep_error",

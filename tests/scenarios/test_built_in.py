@@ -11,13 +11,14 @@ from piazzi import kernels
 from piazzi.scenarios import check, load_scenario, names, show
 
 FOUNDING = ["b612-range", "b612-range-q0", "satellite-bearing"]
+STUDIES = ["founding-study", "founding-study-mismatched"]
 
 
 def test_the_founding_problems_are_built_in():
-    assert names() == FOUNDING
+    assert names() == sorted(FOUNDING + STUDIES)
 
 
-@pytest.mark.parametrize("name", [*FOUNDING, "template"])
+@pytest.mark.parametrize("name", [*FOUNDING, *STUDIES, "template"])
 def test_every_shipped_file_passes_its_own_check(name):
     assert check(name) == []
     assert show(name).startswith("#")
@@ -82,3 +83,15 @@ def test_loading_imports_nothing_heavy():
         "print([m for m in heavy if m in sys.modules])"
     )
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_founding_studies_are_of_satellite_bearing(name):
+    study, single = load_scenario(name), load_scenario("satellite-bearing")
+    assert study.problem.model == single.problem.model
+    assert_array_equal(study.times, single.times)
+    for what in ("mean", "covariance", "station_noise"):
+        assert_array_equal(getattr(study.problem, what), getattr(single.problem, what))
+    assert {"ekf", "iekf", "ukf", "window:10", "window:50", "window:100", "window:200", "smoother", "graph"} == {
+        *study.study.estimators
+    }

@@ -10,7 +10,7 @@ import click
 from piazzi import __version__
 from piazzi.cli.options import Group
 
-COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "windows", "observability", "report")
+COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "study", "windows", "observability", "report")
 
 
 class Commands(Group):

@@ -14,7 +14,7 @@ from piazzi.problem.checks import Array
 _CHUNK = 1 << 14  # epochs at a time: the work space stays in the processor's cache
 _DOUBTFUL = 1e-9  # pivots of correlations from here down may be rounding errors: eigenvalues decide
 _OUTLIER = 0.1  # weight below which a row is taken for an outlier
-_FAR = 10.0  # times the 99.9 % quantile of chi-square: no matched run comes near, however correlated in time
+FAR = 10.0  # times the 99.9 % quantile of chi-square: no matched run comes near, however correlated in time
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +216,7 @@ def _denied(consistency: Consistency) -> bool:
     if not known.any():
         return False
     typical = np.median(consistency.rank[half][known])
-    return bool(np.median(consistency.value[half][known]) > _FAR * quantile(0.999, float(typical)))
+    return bool(np.median(consistency.value[half][known]) > FAR * quantile(0.999, float(typical)))
 
 
 def _persists(error: Array, columns: Sequence[Sequence[int]]) -> bool:

@@ -73,6 +73,15 @@ def array(group: Any, name: str, *, required: bool = True) -> Array | None:
     return np.asarray(data[()])
 
 
+def slab(group: Any, name: str, index: tuple[int | slice, ...]) -> Array:
+    """A part of the numbers of a variable; raises ValueError as `array` does."""
+    data = _variable(group, name, True)
+    if data.dtype.kind not in "biuf" or data.ndim < len(index):
+        raise ValueError(f"variable {name!r} is not an array of numbers with {len(index)} dimensions")
+    out = data[index]
+    return np.asarray(out)
+
+
 def document(group: Any, name: str) -> dict[str, Any]:
     """The JSON object in a variable of characters.
 

@@ -119,6 +119,8 @@ class Truth:
         False gives noiseless measurements.
     manoeuvres : sequence of Manoeuvre, or None
         None: the same, each with an error drawn from its covariance.
+    accept : sequence of equations
+        Which drawn first states count: those where each of these, of states and parameters, is above zero.
     """
 
     state: Any = None
@@ -127,3 +129,4 @@ class Truth:
     integrator: Integrator | None = None
     measurement_noise: bool = True
     manoeuvres: Sequence[Manoeuvre] | None = None
+    accept: Sequence[str] = ()

@@ -15,6 +15,7 @@ from piazzi.scenarios.integrators import read_integrator
 from piazzi.scenarios.manoeuvres import read_manoeuvres
 from piazzi.scenarios.quantities import read_noise, read_parameters, read_prior, read_stations
 from piazzi.scenarios.scenario import Picture, Scenario
+from piazzi.scenarios.studies import read_plan
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.times import read_times
 from piazzi.scenarios.truth import read_truth
@@ -22,7 +23,7 @@ from piazzi.scenarios.units import Units
 
 SECTIONS = (
     "title", "units", "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior",
-    "process_noise", "integrator", "manoeuvres", "times", "truth", "picture",
+    "process_noise", "integrator", "manoeuvres", "times", "truth", "picture", "study",
 )  # fmt: skip
 MAX_STEPS = 10**10
 MAX_ROWS = 2 * 10**7
@@ -37,12 +38,13 @@ def read_scenario(data: Mapping[str, Any], name: str, faults: Faults) -> Scenari
         times = read_times(file.table("times"), units)
         picture = Picture(file.table("picture").number("planet_radius", units.length(), positive=True))
         file.table("picture").finish(("planet_radius",))
+        plan = read_plan(file.table("study"))
         file.finish(SECTIONS)
         if problem is not None and times is not None:
             _check_size(problem, times, faults)
     if faults or problem is None or times is None:
         return None
-    return Scenario(name, title or name, problem, times, picture)
+    return Scenario(name, title or name, problem, times, picture, plan)
 
 
 def read_problem(file: Table, name: str, units: Units) -> Problem | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from piazzi.problem import Problem
@@ -15,6 +16,22 @@ class Picture:
     planet_radius: float | None = None
 
 
+@dataclass(frozen=True)
+class Plan:
+    """What a study of a scenario does unless told otherwise.
+
+    Attributes
+    ----------
+    runs : int, or None
+    estimators : as the command line writes them
+    vary : what is varied, and the values it takes, as text
+    """
+
+    runs: int | None = None
+    estimators: tuple[str, ...] = ()
+    vary: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, eq=False)
 class Scenario:
     """A problem with the times at which it is measured.
@@ -25,6 +42,7 @@ class Scenario:
     problem : Problem, with its `truth` half
     times : (K,) seconds, increasing
     picture : Picture
+    study : Plan
     """
 
     name: str
@@ -32,3 +50,4 @@ class Scenario:
     problem: Problem
     times: Array
     picture: Picture = field(default_factory=Picture)
+    study: Plan = field(default_factory=Plan)

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from piazzi.expressions import check
 from piazzi.model import nearest
 from piazzi.problem import Gaussian, ProcessNoise, Truth
 from piazzi.scenarios.equations import Physics
+from piazzi.scenarios.faults import joined, shown
 from piazzi.scenarios.integrators import read_integrator
 from piazzi.scenarios.manoeuvres import read_manoeuvres
 from piazzi.scenarios.quantities import read_noise
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import Units
+
+MOST_TEXTS = 100
 
 
 def read_truth(table: Table, physics: Physics, prior: Gaussian | None, units: Units) -> Truth | None:
@@ -33,8 +37,23 @@ def read_truth(table: Table, physics: Physics, prior: Gaussian | None, units: Un
     integrator = read_integrator(table.table("integrator"), units)
     noisy = table.flag("measurement_noise", True)
     manoeuvres = read_manoeuvres(table, physics, units) if "manoeuvres" in table else None
+    accept = read_texts(table, "accept")
+    known = [*physics.units]
+    for i, text in enumerate(accept):
+        with table.faults.at(joined(table.at("accept"), i)):
+            check(text, known)
     table.finish()
-    return Truth(mean, parameters, noise, integrator, bool(noisy), manoeuvres)
+    return Truth(mean, parameters, noise, integrator, bool(noisy), manoeuvres, accept)
+
+
+def read_texts(table: Table, key: str) -> tuple[str, ...]:
+    """One text, or a list of them."""
+    value = table.raw(key)
+    texts = [] if value is None else value if isinstance(value, list) else [value]
+    if not all(isinstance(text, str) for text in texts) or len(texts) > MOST_TEXTS:
+        table.fault(key, f"must be text, or a list of at most {MOST_TEXTS} texts, not {shown(value)}")
+        return ()
+    return tuple(texts)
 
 
 def _true_parameters(table: Table, physics: Physics) -> dict[str, float]:

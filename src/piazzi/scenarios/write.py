@@ -100,6 +100,8 @@ def _truth(truth: Truth) -> dict[str, Any]:
         "parameters": {k: float(v) for k, v in truth.parameters.items()},
         "measurement_noise": bool(truth.measurement_noise),
     }
+    if truth.accept:
+        out["accept"] = list(truth.accept)
     if truth.state is not None:
         out["state"] = _listed(truth.state)
     if truth.process_noise is not None:

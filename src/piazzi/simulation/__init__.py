@@ -11,8 +11,19 @@ import numpy as np
 from piazzi import kernels
 from piazzi.problem import Gaussian, Problem, Tracking, Truth
 from piazzi.problem.checks import Array, finite_vector, numeric
+from piazzi.simulation.rule import MOST_DRAWS, NoTruthError, Rule
 
-__all__ = ["simulate", "true_problem"]
+__all__ = [
+    "MOST_DRAWS",
+    "NoTruthError",
+    "Rule",
+    "check_finite",
+    "check_times",
+    "placed",
+    "propagate",
+    "simulate",
+    "true_problem",
+]
 
 
 def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: Sequence[str] | None = None) -> Tracking:
@@ -32,7 +43,7 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
     ValueError
         For bad times, unknown stations, or a truth that becomes infinite.
     """
-    epochs = _checked_times(times)
+    epochs = check_times(times)
     truth_half = problem.truth or Truth()
     actual = true_problem(problem)
     index = np.array([problem.station_index(s) for s in (stations or [s.name for s in problem.stations])], dtype=np.int64)
@@ -42,6 +53,31 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
     first = _first_state(problem, actual, truth_half, rng)
     w = rng.standard_normal((K, n))
     v = rng.standard_normal((K * len(index), M))
+    states, z = propagate(problem, actual, epochs, index, first, w, v if truth_half.measurement_noise else None)
+    names = np.array([s.name for s in problem.stations])[np.tile(index, K)] if len(problem.stations) > 1 else None
+    return Tracking(np.repeat(epochs, len(index)), z, names, states)
+
+
+def propagate(
+    problem: Problem, actual: Problem, epochs: Array, index: Array, first: Array, w: Array, v: Array | None
+) -> tuple[Array, Array]:
+    """True states (K, n) and measurements (J, m) that follow from a first state and unit normal draws.
+
+    Parameters
+    ----------
+    problem, actual : Problem as it is measured, and as it moves
+    epochs : (K,)
+    index : which stations measure, at every epoch
+    first : (n,), the true state at the time of the prior
+    w : (K, n), for process noise
+    v : (J, m), for measurement noise; None for sensors without error
+
+    Raises
+    ------
+    ValueError
+        For a truth that becomes infinite.
+    """
+    K, n, M = len(epochs), problem.model.n, problem.model.width
     start, count, scale = actual.intervals(epochs)
     row_station, first_row = np.tile(index, K), np.arange(K + 1, dtype=np.int64) * len(index)
     states, z = np.empty((K, n)), np.empty((K * len(index), M))
@@ -64,15 +100,18 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
         states,
         z,
     )
+    check_finite(problem, epochs, first, states)
+    if v is not None:
+        z += np.einsum("jab,jb->ja", np.linalg.cholesky(problem.station_noise)[row_station], v)
+    return states, _wrapped(problem, row_station, z)
+
+
+def check_finite(problem: Problem, epochs: Array, first: Array, states: Array) -> None:
+    """Raise ValueError, saying where it began, for a truth (K, n) that is not finite."""
     if not np.isfinite(states).all():
         k = int(np.argmin(np.isfinite(states).all(axis=1)))
         start_text = ", ".join(f"{name} = {value:g}" for name, value in zip(problem.model.names, first, strict=True))
         raise ValueError(f"the simulated truth is not finite from epoch {k} (t = {epochs[k]:g} s); it started at {start_text}")
-    if truth_half.measurement_noise:
-        z += np.einsum("jab,jb->ja", np.linalg.cholesky(problem.station_noise)[row_station], v)
-    z = _wrapped(problem, row_station, z)
-    names = np.array([s.name for s in problem.stations])[row_station] if len(problem.stations) > 1 else None
-    return Tracking(np.repeat(epochs, len(index)), z, names, states)
 
 
 def true_problem(problem: Problem) -> Problem:
@@ -95,20 +134,35 @@ def true_problem(problem: Problem) -> Problem:
 
 
 def _first_state(problem: Problem, actual: Problem, truth: Truth, rng: np.random.Generator) -> Array:
-    """The true first state: as given, or drawn from the prior; estimated constants are drawn unless their truth is given."""
-    states = problem.model.states
-    n, nd = problem.model.n, len(states)
-    draw = rng.standard_normal(n)
+    """The true first state: as given, or drawn from the prior; estimated constants are drawn unless their truth is given.
+
+    Where the truth has a rule about which of them count, the first that it accepts.
+    """
+    rule = Rule(truth.accept, actual)
     values, vectors = np.linalg.eigh(actual.covariance)
-    x = actual.mean + vectors @ (np.sqrt(np.maximum(values, 0.0)) * (vectors.T @ draw))
+    for _ in range(MOST_DRAWS):
+        draw = rng.standard_normal(problem.model.n)
+        x = actual.mean + vectors @ (np.sqrt(np.maximum(values, 0.0)) * (vectors.T @ draw))
+        x = placed(problem, truth, x[None])
+        if rule.accepts(x)[0]:
+            first: Array = x[0]
+            return first
+    raise NoTruthError(rule)
+
+
+def placed(problem: Problem, truth: Truth, x: Array) -> Array:
+    """First states (M, n) drawn from the prior, with what the truth fixes, and memories of what they remember."""
+    states = problem.model.states
     if truth.state is not None:
-        x[:nd] = finite_vector(truth.state, nd, "true state", states)
+        x[:, : len(states)] = finite_vector(truth.state, len(states), "true state", states)
     moving = len(problem.model.moving)
-    x[:moving] = x[list(problem.model.sources)]
-    return np.ascontiguousarray(x)
+    x[:, :moving] = x[:, list(problem.model.sources)]
+    out: Array = np.ascontiguousarray(x)
+    return out
 
 
-def _checked_times(times: Any) -> Array:
+def check_times(times: Any) -> Array:
+    """Times as (K,) numbers; raises ValueError unless they are finite and increase."""
     out = np.ascontiguousarray(numeric(times, "times").reshape(-1))
     if not out.size:
         raise ValueError("there are no times to simulate")

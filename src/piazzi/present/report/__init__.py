@@ -17,6 +17,7 @@ from piazzi.present.report.blocks import (
 from piazzi.present.report.comparison import comparison_tab
 from piazzi.present.report.observability import observability_section, observability_tab
 from piazzi.present.report.page import page
+from piazzi.present.report.study import study_tabs
 from piazzi.present.report.windows import windows_section, windows_tab
 from piazzi.present.report.write import write_page
 
@@ -37,6 +38,7 @@ __all__ = [
     "observability_section",
     "observability_tab",
     "page",
+    "study_tabs",
     "windows_section",
     "windows_tab",
     "write_page",

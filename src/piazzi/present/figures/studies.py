@@ -1,0 +1,127 @@
+"""Pictures of a study: errors and consistency over time, and what accuracy costs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from piazzi.evaluate.quantities import printable
+from piazzi.present.figures.pages import save
+from piazzi.present.figures.style import RC, label_of, line_of, plain, plain_ticks, time_axis
+from piazzi.present.studies import group_display, point_name
+from piazzi.study import Line, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_POINTS = 12  # that get pictures of their own
+FEW = 4  # lines whose bands can be told apart
+
+
+def write_figures(folder: str | os.PathLike[str], summary: Summary) -> list[Path]:
+    """Write the pictures of a study as PNG; returns their paths, raises OSError."""
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    return [save(figure, place / f"{name}.png") for name, figure in study_pages(summary)]
+
+
+def study_pages(summary: Summary) -> Iterator[tuple[str, Figure]]:
+    """Names and figures of the pictures of a study, drawn one at a time."""
+    from matplotlib import rc_context
+
+    for index in range(min(len(summary.stored.points), MOST_POINTS)):
+        lines = [line for line in summary.lines if line.point == point_of(summary, index)]
+        tail = f"-{index}" if len(summary.stored.points) > 1 else ""
+        for name, draw in (("errors", error_page), ("nees", nees_page), ("cost", cost_page)):
+            with rc_context(RC):
+                yield f"study-{name}{tail}", draw(summary, lines)
+
+
+def point_of(summary: Summary, index: int) -> dict[str, Any]:
+    """Values of the axes at a point, by name."""
+    return dict(zip(summary.stored.about["axes"], summary.stored.points[index], strict=True))
+
+
+def error_page(summary: Summary, lines: list[Line]) -> Figure:
+    """For each group of states the root mean square error over runs, and the Cramer-Rao bound; a few lines have bands."""
+    stored = summary.stored
+    figure = _figure(8.0, 2.6 * len(stored.groups) + 0.6)
+    names = tuple(line.estimator for line in lines)
+    for i, group in enumerate(stored.groups):
+        ax, show = figure.add_subplot(len(stored.groups), 1, i + 1), group_display(stored, group)
+        unit = time_axis(ax, stored.times)
+        for line in lines:
+            style = line_of(line.estimator, line.view, names)
+            rms, (low, _, high) = line.course.rms[:, i], line.course.quantiles[:, :, i] * show.factor
+            ax.plot(stored.times * unit.factor, rms * show.factor, label=label_of(line.estimator, line.view), **style)
+            if len(lines) <= FEW:
+                ax.fill_between(stored.times * unit.factor, low, high, color=style["color"], alpha=0.12, linewidth=0)
+        for view, dash in (("realtime", ":"), ("delayed", "-.")):
+            bound = next((line.course.bound[:, i] for line in lines if line.view == view), None)
+            if bound is not None:
+                label = f"bound, {'real time' if view == 'realtime' else 'delayed'}"
+                ax.plot(stored.times * unit.factor, bound * show.factor, color="black", linestyle=dash, label=label)
+        ax.set_yscale("log")
+        plain_ticks(ax)
+        ax.set_ylabel(plain(show.label(f"{printable(group)} error")))
+        if i == 0:
+            ax.legend(ncols=3, fontsize=7)
+    _title(figure, summary, lines, f"root mean square{'; shaded, 5 to 95 % of runs' if len(lines) <= FEW else ''}")
+    return figure
+
+
+def nees_page(summary: Summary, lines: list[Line]) -> Figure:
+    """Mean NEES over runs with the bounds that it should keep."""
+    stored = summary.stored
+    figure = _figure(8.0, 3.6)
+    ax, names = figure.add_subplot(), tuple(line.estimator for line in lines)
+    unit = time_axis(ax, stored.times)
+    for line in lines:
+        style = line_of(line.estimator, line.view, names)
+        ax.plot(stored.times * unit.factor, line.course.nees, label=label_of(line.estimator, line.view), **style)
+    widest = max((line.course.nees_bounds for line in lines), key=lambda b: b[1] - b[0])
+    ax.axhspan(*widest, color="#BBBBBB", alpha=0.5, label="99 % bounds")
+    ax.set_yscale("log")
+    plain_ticks(ax)
+    ax.set_ylabel("mean NEES over runs")
+    ax.legend(ncols=3, fontsize=7)
+    _title(figure, summary, lines, f"ideal {len(stored.about['states'])}")
+    return figure
+
+
+def cost_page(summary: Summary, lines: list[Line]) -> Figure:
+    """What a run costs, and how far its errors in the last half are from the least possible."""
+    stored = summary.stored
+    group = stored.groups[0]
+    figure = _figure(7.0, 4.0)
+    ax, names = figure.add_subplot(), tuple(line.estimator for line in lines)
+    for line in lines:
+        value = line.over_bound[group] or (line.rmse_last_half[group] if line.over_bound[group] is None else None)
+        if value is None or line.seconds is None:
+            continue
+        style = line_of(line.estimator, line.view, names)
+        ax.plot(line.seconds * 1e3, value, marker="o" if line.view == "realtime" else "s", linestyle="", color=style["color"])
+        text = plain(label_of(line.estimator, line.view))
+        ax.annotate(text, (line.seconds * 1e3, value), xytext=(5, 3), textcoords="offset points", fontsize=7)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    plain_ticks(ax)
+    ax.set_xlabel("time of one run [ms]")
+    ax.set_ylabel(plain(f"{printable(group)} RMSE, last half, over its bound"))
+    _title(figure, summary, lines, "circles, real time; squares, delayed")
+    return figure
+
+
+def _title(figure: Figure, summary: Summary, lines: list[Line], remark: str) -> None:
+    about = summary.stored.about["specification"]
+    where = point_name(lines[0].point)
+    text = f"{about['name'] or 'study'}: {about['runs']:,} runs{f', {where}' if where else ''}; {remark}"
+    figure.suptitle(plain(text), fontsize=10, x=0.01, ha="left")
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")

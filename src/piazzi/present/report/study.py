@@ -1,0 +1,139 @@
+"""A study -> the tab of a page, one for each point of its grid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from piazzi.evaluate.quantities import Display, number, printable
+from piazzi.present.colours import dash_of, label_of, shades
+from piazzi.present.figures.style import time_display
+from piazzi.present.report.blocks import Axis, Chart, Key, Line, Point, Section, Tab, Table, Text
+from piazzi.present.studies import columns, failures, group_display, heading, point_name
+from piazzi.problem.checks import Array
+from piazzi.study import Line as Result
+from piazzi.study import Summary
+
+MOST_TABS = 12
+_READING = (
+    "The error of a run is the length of its error vector; the last half is what is left once an estimator has settled. The"
+    " bound is the Cramer-Rao bound, linearised at the truths: no estimator without bias has a smaller root mean square.",
+    "NEES is the squared error in units of the covariance that the estimator claims. At each epoch its mean over runs should"
+    " lie in the grey range; above it, errors are larger than claimed. A run has diverged when it has left the truth without"
+    " knowing.",
+)
+
+
+def study_tabs(summary: Summary, title: str = "") -> list[Tab]:
+    """A tab for each point, the first twelve."""
+    points = summary.stored.points[:MOST_TABS]
+    return [_tab(summary, index, title) for index in range(len(points))]
+
+
+def _tab(summary: Summary, index: int, title: str) -> Tab:
+    stored = summary.stored
+    rows = len(stored.rows)
+    lines = summary.lines[index * rows : (index + 1) * rows]
+    where = point_name(lines[0].point)
+    name = title or stored.about["specification"]["name"] or "Study"
+    own, dashes = shades(line.estimator for line in lines), [line.estimator for line in lines]
+    keys = [
+        Key(label_of(line.estimator, line.view), own[line.estimator], dash_of(line.estimator, line.view, dashes))
+        for line in lines
+    ]
+    show = time_display(stored.times)
+    axis = Axis("time", show, low=float(stored.times[0]), high=float(stored.times[-1]))
+    charts = [chart for i, group in enumerate(stored.groups) for chart in _errors(summary, lines, keys, axis, i, group)]
+    return Tab(
+        f"{name}: {where}" if where else name,
+        heading(stored),
+        _points(summary, lines),
+        [
+            Section("How far off", charts, "Over all runs that did not fail, at each epoch."),
+            Section("Are they honest?", [_nees(lines, keys, axis, len(stored.about["states"]))]),
+            _table(summary, index, rows),
+            Section("How to read this", [Text([*_READING, *failures(summary)])]),
+        ],
+        keys=keys,
+        times=stored.times,
+        show_time=show,
+    )
+
+
+def _errors(summary: Summary, lines: Sequence[Result], keys: Sequence[Key], axis: Axis, i: int, group: str) -> list[Chart]:
+    """Median, root mean square and 95 % of the error of one group of states."""
+    stored = summary.stored
+    show = group_display(stored, group)
+    out = []
+    kinds = [
+        ("Median", [line.course.quantiles[1, :, i] for line in lines]),
+        ("Root mean square", [line.course.rms[:, i] for line in lines]),
+        ("95 % of runs are below", [line.course.quantiles[2, :, i] for line in lines]),
+    ]
+    for kind, found in kinds:
+        drawn = [Line(stored.times, y, keys[k].label, k) for k, y in enumerate(found)]
+        if kind == "Root mean square":
+            for view, dash in (("realtime", (2, 2)), ("delayed", (6, 2))):
+                bound = next((line.course.bound[:, i] for line in lines if line.view == view), None)
+                if bound is not None and np.isfinite(bound).any():
+                    drawn.append(Line(stored.times, bound, f"bound, {view}", colour="#777777", dash=dash))
+        low, high = _limits([line.y for line in drawn if not isinstance(line.y, tuple)])
+        name = printable(group)
+        y = Axis(f"{name} error", show, "log", low, high)
+        note = "Grey: the Cramer-Rao bound." if len(drawn) > len(lines) else ""
+        out.append(Chart(f"{kind}: error of {name}", axis, y, drawn, note=note, column=f"{name}, {kind.lower()}"))
+    return out
+
+
+def _nees(lines: Sequence[Result], keys: Sequence[Key], axis: Axis, n: int) -> Chart:
+    drawn = [
+        Line(np.linspace(axis.low or 0.0, axis.high or 1.0, len(line.course.nees)), line.course.nees, keys[k].label, k)
+        for k, line in enumerate(lines)
+    ]
+    low, high = max((line.course.nees_bounds for line in lines), key=lambda b: b[1] - b[0])
+    bottom, top = _limits([*(line.course.nees for line in lines), np.array([low, high])])
+    y = Axis("mean NEES", Display(""), "log", bottom, top)
+    return Chart(f"Mean NEES over runs, ideal {n}", axis, y, drawn, ranges=[(low, high, "")], column="mean NEES")
+
+
+def _limits(series: Sequence[Array]) -> tuple[float, float]:
+    good = np.concatenate([s[np.isfinite(s) & (s > 0)] for s in series])
+    return (0.8 * float(good.min()), 1.25 * float(good.max())) if good.size else (0.1, 10.0)
+
+
+def _table(summary: Summary, index: int, rows: int) -> Section:
+    shown = columns(summary)
+    part = slice(index * rows, (index + 1) * rows)
+    texts = list(zip(*(c.texts[part] for c in shown), strict=True))
+    return Section("All numbers", [Table([(c.title, c.unit) for c in shown], texts, keys=list(range(rows)))])
+
+
+def _points(summary: Summary, lines: Sequence[Result]) -> list[Point]:
+    """The smallest errors, who diverges, who is honest, and who is cheap."""
+    group = summary.stored.groups[0]
+    show = group_display(summary.stored, group)
+    out = []
+    for view, words in (("realtime", "in real time"), ("delayed", "with later measurements")):
+        found = [(m, line) for line in lines if line.view == view and (m := _median(line, group)) is not None]
+        if found:
+            error, best = min(found, key=lambda pair: pair[0])
+            text = f"{best.estimator}: median {printable(group)} error {number(error * show.factor, 3)}{show.suffix}."
+            out.append(Point(f"Smallest errors {words}", text))
+    diverged = [line for line in lines if line.diverged]
+    text = "; ".join(f"{label_of(line.estimator, line.view)}: {line.diverged:,} of {line.runs:,}" for line in diverged)
+    out.append(Point("Diverged", f"{text}." if text else "No run.", "bad" if diverged else "good"))
+    honest = [line for line in lines if (line.course.inside or 0.0) >= 0.9]
+    names = ", ".join(label_of(line.estimator, line.view) for line in honest)
+    text = f"{names}." if names else "None: mean NEES leaves its bounds."
+    out.append(Point("Honest at nine epochs of ten", text, "good" if honest else "bad"))
+    failed = [line for line in lines if line.failed]
+    if failed:
+        text = "; ".join(f"{label_of(line.estimator, line.view)}: {line.failed:,}" for line in failed)
+        out.append(Point("Failed runs", f"{text}.", "bad"))
+    return out
+
+
+def _median(line: Result, group: str) -> float | None:
+    found = line.rmse_last_half_quantiles[group]
+    return None if found is None else found[1]

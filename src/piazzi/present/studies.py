@@ -1,0 +1,133 @@
+"""A study's summary as a table for terminals, and in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, number, printable, unit_of
+from piazzi.study import Line, Stored, Summary
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, RenderResult
+
+_VIEW = {"realtime": "real time", "delayed": "delayed"}
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: what it is, its unit or remark, the text of every line, and whether it is shown where there is no room."""
+
+    title: str
+    unit: str
+    texts: tuple[str, ...]
+    essential: bool = True
+
+
+def group_display(stored: Stored, group: str) -> Display:
+    """The unit to show the errors of a group of states in, one for all lines."""
+    units = dict(zip(stored.groups, stored.about["units"], strict=True))
+    return display_of(unit_of(units[group]), [line.rmse_last_half[group] for line in stored.summary.lines])
+
+
+def point_name(point: Mapping[str, Any]) -> str:
+    """Values of the axes at a point, in words; "" where nothing is varied."""
+    return printable(", ".join(f"{name} = {value}" for name, value in point.items()))
+
+
+def columns(summary: Summary) -> list[Column]:
+    """Everything the table shows."""
+    lines, stored = summary.lines, summary.stored
+    n = len(stored.about["states"])
+    found = [Column(printable(axis), "", tuple(str(line.point[axis]) for line in lines)) for axis in stored.about["axes"]]
+    found += [
+        Column("estimator", "", tuple(printable(line.estimator) for line in lines)),
+        Column("view", "", tuple(_VIEW.get(line.view, line.view) for line in lines)),
+        Column("diverged", "95 % interval", tuple(_rate(line) for line in lines)),
+    ]
+    for group in stored.groups:
+        show, name = group_display(stored, group), printable(group)
+        found.append(
+            Column(f"{name} error, last half", f"{show.unit}: 5, 50, 95 %", tuple(_spread(x, group, show) for x in lines))
+        )
+        ratios = tuple(number(line.over_bound[group], 3) for line in lines)
+        found.append(Column(f"{name} RMSE over bound", "ideal 1", ratios, False))
+    inside = tuple(NOTHING if (i := x.course.inside) is None else f"{100 * i:.0f} %" for x in lines)
+    found += [
+        Column("mean NEES", f"ideal {n}", tuple(number(line.mean_nees_last_half, 3) for line in lines)),
+        Column("median NEES", "last half", tuple(number(line.median_nees_last_half, 3) for line in lines), False),
+        Column("NEES in 99 % bounds", "of epochs", inside, False),
+        Column("mean NIS", "", tuple(number(line.mean_nis, 3) for line in lines), False),
+        Column("time", "per run", tuple(duration(line.seconds) for line in lines)),
+        Column("failed", "", tuple(f"{line.failed:,}" if line.failed else "" for line in lines)),
+    ]
+    return [c for c in found if any(text not in ("", NOTHING) for text in c.texts)]
+
+
+class StudyTable:
+    """The lines of a study for rich: all columns where they fit, else the most telling ones, else a block for each line."""
+
+    def __init__(self, summary: Summary) -> None:
+        self._columns = columns(summary)
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        from rich.measure import Measurement
+        from rich.text import Text
+
+        for shown in (self._columns, [c for c in self._columns if c.essential]):
+            table = _table(shown)
+            if Measurement.get(console, options.update(max_width=10_000), table).maximum <= options.max_width:
+                yield table
+                if shown is not self._columns:
+                    yield Text("A wider terminal shows more.", style="dim")
+                return
+        for row in zip(*(c.texts for c in self._columns), strict=True):
+            for c, value in zip(self._columns, row, strict=True):
+                if value not in ("", NOTHING):
+                    yield Text(f"{'' if c is self._columns[0] else '  '}{c.title}: {value}{f' ({c.unit})' if c.unit else ''}")
+
+
+def _table(shown: list[Column]) -> Any:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, header_style="bold", show_edge=False, padding=(0, 1, 0, 0))
+    numbers_from = next(i for i, c in enumerate(shown) if c.title == "view") + 1
+    for i, c in enumerate(shown):
+        heading = Text("\n".join([*c.title.split(), *filter(None, [c.unit])]))
+        table.add_column(heading, justify="right" if i >= numbers_from else "left", no_wrap=True, vertical="bottom")
+    for row in zip(*(c.texts for c in shown), strict=True):
+        table.add_row(*(Text(text) for text in row))
+    return table
+
+
+def heading(stored: Stored) -> str:
+    """One line on what was studied."""
+    specification = stored.about["specification"]
+    points = len(stored.points)
+    at = f" at {points:,} points" if points > 1 else ""
+    runs = f"{specification['runs']:,} runs of {stored.about['epochs']:,} epochs{at}"
+    return printable(f"{specification['name'] or 'study'}: {runs}, seed {specification['seed']}")
+
+
+def failures(summary: Summary, most: int = 5) -> list[str]:
+    """The first runs that failed, and why."""
+    found = summary.to_dict()["messages"]
+    out = [printable(f"run {m['run']}, {m['estimator']} ({_VIEW[m['view']]}): {m['message']}") for m in found[:most]]
+    total = sum(line.failed for line in summary.lines)
+    return [*out, f"... and {total - most:,} more"] if total > most else out
+
+
+def _rate(line: Line) -> str:
+    if line.diverged_interval is None:
+        return NOTHING
+    low, high = (100 * x for x in line.diverged_interval)
+    done = line.runs - line.failed
+    return f"{100 * line.diverged / done:.3g} % ({low:.2g}-{high:.2g})"
+
+
+def _spread(line: Line, group: str, show: Display) -> str:
+    found = line.rmse_last_half_quantiles[group]
+    return NOTHING if found is None else "  ".join(number(v * show.factor, 3) for v in found)

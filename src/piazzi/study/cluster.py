@@ -1,0 +1,208 @@
+"""Tasks on a Dask cluster: one that is there already, or one started here for the purpose."""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import time
+from contextlib import suppress
+from functools import lru_cache
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+from piazzi.study.pieces import Piece, Task, run_task
+from piazzi.study.plan import Study
+from piazzi.study.pool import THREADS, Outcome, processors
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+LOCAL = "local"
+CONNECT_SECONDS = 5  # a dead address fails within ten, however it is dead and with all imports
+WORKERS_SECONDS = 30  # until a scheduler has its first worker
+_SAME = ("python", "piazzi", "numpy", "llvmlite", "numba")
+
+
+class Cluster:
+    """Tasks as a cluster's futures.
+
+    Parameters
+    ----------
+    study : Study
+    address : of a scheduler, ``tcp://host:8786``, or "local"
+    workers : processes of a local cluster
+
+    Raises
+    ------
+    OSError
+        Where the scheduler does not answer.
+    ValueError
+        Where Dask is not installed, the address makes no sense, or workers have other versions than this process.
+    """
+
+    def __init__(self, study: Study, address: str, workers: int | None) -> None:
+        try:
+            import distributed  # noqa: F401
+        except ImportError:
+            raise ValueError(
+                "--scheduler needs Dask, which is not installed: pip install 'piazzi[cluster]', here and on the workers"
+            ) from None
+        for name in ("distributed", "tornado.application", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        self._study, self._here = pickle.dumps(study), fingerprint()
+        self._futures: dict[str, tuple[Future, Task]] = {}
+        self._done: SimpleQueue[str] = SimpleQueue()
+        self._cluster = _local(workers) if address == LOCAL else None
+        self.address = self._cluster.scheduler_address if self._cluster else address
+        try:
+            self._client = _client(self.address)
+            _check_versions(self._client, self.address, self._here)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def slots(self) -> int:
+        """Threads of all workers there are now."""
+        return max(1, int(sum(self._client.nthreads().values())))
+
+    def submit(self, task: Task) -> None:
+        future = self._client.submit(_run, self._here, self._study, task, pure=False)
+        self._futures[future.key] = (future, task)
+        future.add_done_callback(lambda done: self._done.put(done.key))
+
+    def wait(self) -> list[Outcome]:
+        while True:
+            if self._client.status not in ("running", "connecting"):
+                self._gone()
+            with suppress(Empty):
+                return [self._outcome(*self._futures.pop(self._done.get(timeout=1)))]
+
+    def close(self) -> None:
+        for thing in (getattr(self, "_client", None), getattr(self, "_cluster", None)):
+            if thing is not None:
+                with suppress(Exception):
+                    thing.close(timeout=3)
+
+    def _outcome(self, future: Future, task: Task) -> Outcome:
+        from distributed.scheduler import KilledWorker
+
+        if future.status in ("cancelled", "lost"):
+            self._gone()
+        try:
+            result = future.result(timeout=CONNECT_SECONDS)
+        except KilledWorker:
+            return Outcome(task, died="worker lost")
+        except TimeoutError:
+            self._gone()
+        except Exception as error:
+            return Outcome(task, error=f"{type(error).__name__}: {' '.join(str(error).split())}")
+        if isinstance(result, Piece):
+            return Outcome(task, result)
+        return Outcome(task, error=str(result), hopeless=True)
+
+    def _gone(self) -> None:
+        raise ConnectionError(f"the scheduler at {self.address} is gone; what was finished is kept")
+
+
+def _local(workers: int | None) -> Any:
+    """A cluster of single-threaded processes on this machine."""
+    import os
+
+    import dask
+    from distributed import LocalCluster
+
+    # a worker that dies takes its task with it at once: how often it is tried again is decided here
+    dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.comm.timeouts.connect": "10s"})
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    return LocalCluster(
+        n_workers=workers or processors(), threads_per_worker=1, silence_logs=logging.CRITICAL, dashboard_address="127.0.0.1:0"
+    )
+
+
+def _client(address: str) -> Client:
+    from distributed import Client
+
+    _knock(address)
+    client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_SECONDS)
+    except TimeoutError:
+        client.close(timeout=3)
+        raise ConnectionError(f"the scheduler at {address} has no workers (waited {WORKERS_SECONDS} s)") from None
+    return client
+
+
+def _knock(address: str) -> None:
+    """Raise unless something at the address speaks Dask's protocol: a client that cannot connect takes long to give up."""
+    import asyncio
+    from concurrent.futures import ThreadPoolExecutor
+
+    from distributed.comm import connect, parse_address
+
+    async def greet() -> None:
+        comm = await asyncio.wait_for(connect(address, timeout=CONNECT_SECONDS), CONNECT_SECONDS)
+        await comm.close()
+
+    started = time.monotonic()
+    try:
+        parse_address(address, strict=True)
+        with ThreadPoolExecutor(1) as elsewhere:  # the caller may have a loop of its own
+            elsewhere.submit(asyncio.run, greet()).result()
+    except (OSError, TimeoutError, MemoryError) as error:
+        waited = time.monotonic() - started
+        raise ConnectionError(f"no Dask scheduler answers at {address} (tried for {waited:.0f} s)") from error
+    except Exception as error:
+        raise ValueError(f"{address!r} is no address of a scheduler, such as tcp://host:8786: {error}") from None
+
+
+def _check_versions(client: Client, address: str, here: dict[str, str]) -> None:
+    try:
+        there = client.run(fingerprint)
+    except Exception as error:
+        raise ValueError(f"workers of {address} cannot run Piazzi: {type(error).__name__}: {error}") from None
+    for worker, versions in there.items():
+        difference = _difference(versions, here)
+        if difference:
+            raise ValueError(f"worker {worker} has {difference}: results would not be the same")
+
+
+def _difference(there: dict[str, str], here: dict[str, str]) -> str:
+    return "; ".join(
+        f"{name} {there.get(name, 'none')}, not {here[name]} as here" for name in _SAME if there.get(name) != here[name]
+    )
+
+
+@lru_cache(maxsize=1)
+def _fingerprint() -> tuple[tuple[str, str], ...]:
+    import hashlib
+    import platform
+    from importlib.metadata import version
+    from pathlib import Path
+
+    root, text = Path(__file__).resolve().parents[1], hashlib.sha256()
+    for file in sorted(root.rglob("*.py")):
+        text.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
+    own = f"{version('piazzi')} (source {text.hexdigest()[:8]})"
+    others = {name: version(name) for name in ("numpy", "llvmlite", "numba")}
+    return tuple({"python": platform.python_version(), "piazzi": own, **others}.items())
+
+
+def fingerprint() -> dict[str, str]:
+    """Versions of everything that the bits of a result depend on, the text of Piazzi itself included."""
+    return dict(_fingerprint())
+
+
+@lru_cache(maxsize=4)
+def _unpickled(study: bytes) -> Study:
+    found = pickle.loads(study)
+    assert isinstance(found, Study)
+    return found
+
+
+def _run(expected: dict[str, str], study: bytes, task: Task) -> Piece | str:
+    """On a worker: the piece, or why this worker must not make one."""
+    difference = _difference(fingerprint(), expected)
+    if difference:
+        return f"a worker has {difference}: results would not be the same"
+    return run_task(_unpickled(study), task)

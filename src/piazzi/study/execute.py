@@ -1,0 +1,137 @@
+"""From a study to its store: begin or continue, run, finish."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from piazzi.io.atomic import check_writable
+from piazzi.study.log import ENDING, Log
+from piazzi.study.plan import Study
+from piazzi.study.pool import Here, Processes, Workers, processors
+from piazzi.study.runner import Progress, Runner
+from piazzi.study.store import Stored, read_store, write_store
+
+
+def run_study(
+    study: Study,
+    path: str | os.PathLike[str],
+    *,
+    resume: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    chunk: int | None = None,
+    progress: Progress | None = None,
+) -> Stored:
+    """Run a study into a NetCDF file.
+
+    While it runs, finished runs are in a file beside it, `path` with ``.runs`` behind, from which an interrupted study goes on.
+
+    Parameters
+    ----------
+    study : Study
+    path : of the store, ``.nc``
+    resume : continue what is there; a finished study is read, nothing is computed twice
+    workers : processes, default one for each processor; 0 runs in this one
+    scheduler : address of a Dask scheduler, or "local" to start a cluster of `workers` processes here
+    chunk : runs per task; default as many as take about a second
+    progress : called with the runs that are done and their total
+
+    Raises
+    ------
+    OSError
+        Where the store cannot be written (what is finished is kept), or the scheduler not reached.
+    ValueError
+        For a store of another study, or one that is there already without `resume`.
+    RuntimeError
+        Where workers cannot run anything.
+    """
+    for what, value, least in (("workers", workers, 0), ("chunk", chunk, 1)):
+        if value is not None and (value != int(value) or value < least):
+            raise ValueError(f"{what} is {value}; it must be a whole number of {least} or more")
+    store = Path(path)
+    if store.suffix.lower() != ".nc":
+        raise ValueError(f"{os.fspath(path)}: a study is kept in a .nc file")
+    check_writable(store)
+    finished = _finished(study, store, resume)
+    beside = store.with_name(store.name + ENDING)
+    if finished is not None:
+        if beside.exists():  # its end came between the two
+            beside.unlink()
+        return finished
+    log = _log(study, beside, resume)
+    try:
+        team = _team(study, workers, scheduler)
+        try:
+            Runner(study, log, team, chunk, progress).run()
+        finally:
+            team.close()
+        write_store(store, study, log)
+        log.remove()
+    finally:
+        if log.entries:
+            log.close()
+        else:
+            log.remove()
+    return read_store(store)
+
+
+def kept_runs(path: str | os.PathLike[str]) -> int:
+    """Runs of an interrupted study that are on disk; 0 where there is none."""
+    try:
+        log = Log.open(Path(os.fspath(path) + ENDING))
+    except (OSError, ValueError):
+        return 0
+    log.close()
+    return sum(entry.task.count for entry in log.entries)
+
+
+def _finished(study: Study, store: Path, resume: bool) -> Stored | None:
+    """The store, where it is there and of this study."""
+    if not store.exists():
+        return None
+    found = read_store(store)
+    difference = _difference(found.about["specification"], study.specification)
+    if difference:
+        raise ValueError(f"{store} holds another study: {difference}")
+    if not resume:
+        raise ValueError(f"{store} holds this study, finished: --resume shows it, another name or no file there runs it anew")
+    return found
+
+
+def _log(study: Study, path: Path, resume: bool) -> Log:
+    if not path.exists():
+        return Log.create(path, study.specification)
+    if not resume:
+        raise ValueError(f"{path} has runs of a study that was not finished: --resume goes on with it, removing it begins anew")
+    log = Log.open(path)
+    difference = _difference(log.specification, study.specification)
+    if difference:
+        log.close()
+        raise ValueError(f"{path} has runs of another study: {difference}")
+    return log
+
+
+def _difference(there: Any, here: Mapping[str, Any]) -> str:
+    """What differs first between two specifications, "" where they are equal."""
+    here = json.loads(json.dumps(here))
+    there = there if isinstance(there, dict) else {}
+    for key in (*here, *there):
+        if here.get(key) != there.get(key):
+            if isinstance(here.get(key), (int, str)) and isinstance(there.get(key), (int, str)) and key != "times":
+                return f"{key} is {there[key]!r} there and {here[key]!r} here"
+            return f"its {key} {'are' if key.endswith('s') else 'is'} not the same"
+    return ""
+
+
+def _team(study: Study, workers: int | None, scheduler: str | None) -> Workers:
+    if scheduler is not None:
+        from piazzi.study.cluster import Cluster
+
+        return Cluster(study, scheduler, workers)
+    if workers == 0:
+        return Here(study)
+    return Processes(study, workers or processors())

@@ -1,0 +1,190 @@
+"""Finished pieces on disk while a study runs: one file that only grows, each record whole or not there at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import struct
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from piazzi.study.pieces import Piece, Task
+
+ENDING = ".runs"
+_MAGIC = b"PZRUNS1\n"
+_HEAD = struct.Struct("<8sQ32s")  # magic, length of what follows, its SHA-256
+_LONGEST = 2**34
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Where a piece is in the file."""
+
+    task: Task
+    offset: int
+
+
+class Log:
+    """The file, open for reading and appending; only one process at a time can have it open."""
+
+    def __init__(self, path: Path, file: IO[bytes], specification: dict[str, Any], entries: list[Entry]) -> None:
+        self.path, self._file, self.specification, self.entries = path, file, specification, entries
+
+    @classmethod
+    def create(cls, path: Path, specification: dict[str, Any]) -> Log:
+        """A new, empty one; raises OSError (FileExistsError where there is one)."""
+        file = open(path, "x+b", buffering=0)  # noqa: SIM115
+        try:
+            _lock(file, path)
+            log = cls(path, file, specification, [])
+            log._append_bytes(_record({"specification": specification}, b""))
+        except BaseException:
+            file.close()
+            with suppress(OSError):
+                path.unlink()
+            raise
+        _settle_folder(path)
+        return log
+
+    @classmethod
+    def open(cls, path: Path) -> Log:
+        """What there is, without the tail that a sudden end left behind; raises OSError, or ValueError for another file."""
+        file = open(path, "r+b", buffering=0)  # noqa: SIM115
+        try:
+            _lock(file, path)
+            return cls._scan(path, file)
+        except BaseException:
+            file.close()
+            raise
+
+    @classmethod
+    def _scan(cls, path: Path, file: IO[bytes]) -> Log:
+        first = _read(file)
+        if first is None or "specification" not in first[0]:
+            raise ValueError(f"{path}: no runs of a study are in this file")
+        entries, end = [], file.tell()
+        while True:
+            found = _read(file)
+            if found is None:
+                break
+            entries.append(Entry(Task(*found[0]["task"]), end))
+            end = file.tell()
+        if os.fstat(file.fileno()).st_size > end:
+            file.truncate(end)
+        return cls(path, file, first[0]["specification"], entries)
+
+    def append(self, piece: Piece) -> None:
+        """Add a piece, on disk when this returns.
+
+        Raises
+        ------
+        OSError
+            Where it cannot be written; what was there before stays as it was.
+        """
+        offset = self._file.seek(0, os.SEEK_END)
+        self._append_bytes(_packed(piece))
+        self.entries.append(Entry(piece.task, offset))
+
+    def read(self, entry: Entry) -> Piece:
+        """A piece; raises ValueError where it was damaged meanwhile."""
+        self._file.seek(entry.offset)
+        found = _read(self._file)
+        if found is None:
+            raise ValueError(f"{self.path}: the runs at byte {entry.offset} were damaged")
+        return _unpacked(*found)
+
+    def pieces(self) -> Iterator[Piece]:
+        """All pieces, one at a time."""
+        for entry in self.entries:
+            yield self.read(entry)
+
+    def close(self) -> None:
+        self._file.close()
+
+    def remove(self) -> None:
+        """Close and delete."""
+        with suppress(FileNotFoundError):
+            self.path.unlink()
+        self._file.close()
+
+    def _append_bytes(self, data: bytes) -> None:
+        start = self._file.seek(0, os.SEEK_END)
+        try:
+            view = memoryview(data)
+            while view:
+                view = view[self._file.write(view) :]
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            with suppress(OSError):
+                self._file.truncate(start)
+            raise OSError(error.errno, error.strerror, str(self.path)) from error
+
+
+def _record(header: dict[str, Any], body: bytes) -> bytes:
+    text = json.dumps(header).encode()
+    payload = struct.pack("<Q", len(text)) + text + body
+    return _HEAD.pack(_MAGIC, len(payload), hashlib.sha256(payload).digest()) + payload
+
+
+def _read(file: IO[bytes]) -> tuple[dict[str, Any], bytes] | None:
+    """Header and body of the next record; None where there is no whole one."""
+    head = file.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        return None
+    magic, length, digest = _HEAD.unpack(head)
+    if magic != _MAGIC or not 8 <= length <= _LONGEST or length > os.fstat(file.fileno()).st_size - file.tell():
+        return None
+    payload = file.read(length)
+    if len(payload) != length or hashlib.sha256(payload).digest() != digest:
+        return None
+    (size,) = struct.unpack_from("<Q", payload)
+    return json.loads(payload[8 : 8 + size]), payload[8 + size :]
+
+
+def _packed(piece: Piece) -> bytes:
+    arrays = {name: np.ascontiguousarray(a) for name, a in piece.arrays.items()}
+    header = {
+        "task": [piece.task.point, piece.task.first, piece.task.count],
+        "arrays": [[name, a.dtype.str, list(a.shape)] for name, a in arrays.items()],
+        "messages": [list(m) for m in piece.messages],
+    }
+    return _record(header, b"".join(a.tobytes() for a in arrays.values()))
+
+
+def _unpacked(header: dict[str, Any], body: bytes) -> Piece:
+    arrays, at = {}, 0
+    for name, kind, shape in header["arrays"]:
+        count = int(np.prod(shape, dtype=np.int64))
+        arrays[name] = np.frombuffer(body, np.dtype(kind), count, at).reshape(shape)
+        at += arrays[name].nbytes
+    return Piece(Task(*header["task"]), arrays, tuple((row, run, text) for row, run, text in header["messages"]))
+
+
+def _lock(file: IO[bytes], path: Path) -> None:
+    """Keep other processes out for as long as the file is open, where the system can."""
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise ValueError(f"{path}: another process is running this study") from None
+    except OSError:
+        return  # a file system without locks
+
+
+def _settle_folder(path: Path) -> None:
+    """Make the new name survive a power failure."""
+    with suppress(OSError, AttributeError):
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)

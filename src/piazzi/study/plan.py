@@ -1,0 +1,236 @@
+"""A study: which runs of which estimators at which points of a grid, and how each run is told from all others."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, is_dataclass
+from functools import cached_property
+from itertools import product
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piazzi.estimate import SlidingWindow
+from piazzi.estimate.estimator import View
+from piazzi.estimate.registry import parse, views_of
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+from piazzi.scenarios import load_scenario
+from piazzi.scenarios.write import problem_to_tables
+from piazzi.simulation import Rule, check_times, true_problem
+from piazzi.study.axes import Axis, Value, estimator_settings, problems_at, read_value, split, variant
+
+if TYPE_CHECKING:
+    from piazzi.study.store import Stored
+
+SCHEMA = "piazzi.study/1"
+MOST_POINTS = 100_000
+MOST_ESTIMATES = 10**9
+MOST_EPOCHS = 121  # epochs at which every run is kept; scores are over all of them
+BOUND_RUNS = 512  # truths that the Cramer-Rao bound is averaged over
+_PIECE_BYTES = 48e6
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Simulate, estimate and score `runs` seeds at every point of a grid.
+
+    Parameters
+    ----------
+    problem : Problem, with its truth half
+    times : (K,) seconds, strictly increasing
+    estimators : names as on the command line, or a mapping of the name to show to such a name or an estimator
+    runs : int
+    seed : int
+        Of everything.  Draws of prior, process and measurement noise of a run are children of it by the run's number: a run is
+        the same whatever else is run, and at every point of the grid.
+    vary : mapping of name to values
+        Settings of estimators (``lag``, ``iterations``, ``gate``, ...), each for those that have it; ``R.scale``,
+        ``R.STATION.scale``, ``Q.scale``, ``P.scale``, ``substeps`` and parameters by name, for the problem.  A number of the
+        problem changes what estimators believe and what happens; with ``assumed.`` or ``truth.`` before it, one of the two.
+    name : str, for the record
+
+    Raises
+    ------
+    ValueError
+        For unknown names (with the nearest), values that do not fit, or a grid beyond reason.
+    """
+
+    problem: Problem
+    times: Any
+    estimators: Any
+    runs: int = 100
+    seed: int = 0
+    vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "times", check_times(self.times))
+        put(self, "estimators", _named(self.estimators))
+        put(self, "vary", {str(k): tuple(map(read_value, v)) for k, v in self.vary.items()})
+        for what, value, least in (("runs", self.runs, 1), ("seed", self.seed, 0)):
+            if isinstance(value, bool) or value != int(value) or value < least:
+                raise ValueError(f"{what} is {value!r}; it must be a whole number of {least} or more")
+        if not self.problem.stations:
+            raise ValueError("the problem has no stations, so nothing can be measured")
+        self._check()
+
+    @classmethod
+    def of(cls, scenario: str | os.PathLike[str], **changes: Any) -> Study:
+        """The study of a scenario, by name or path: as its section [study] says, with these changes."""
+        found = load_scenario(scenario)
+        plan = found.study
+        given: dict[str, Any] = {
+            "estimators": plan.estimators or ("ekf",),
+            "runs": plan.runs or 100,
+            "vary": plan.vary,
+            "name": found.name,
+        } | changes
+        return cls(found.problem, found.times, **given)
+
+    def _check(self) -> None:
+        """Refuse what no run could do, before the first."""
+        if self.points > MOST_POINTS or self.estimates > MOST_ESTIMATES:
+            sizes = " x ".join(str(len(axis.values)) for axis in self.axes) or "1"
+            raise ValueError(
+                f"the grid of {sizes} has {self.points:,} points, with {self.runs:,} runs of {len(self.variants)} estimators "
+                f"{self.estimates:,} estimates; at most {MOST_POINTS:,} points and {MOST_ESTIMATES:,} estimates are allowed"
+            )
+        for values in {v for axis_index in range(len(self.axes)) for v in self._corners(axis_index)}:
+            problems_at(self.problem, self.axes, values)
+        actual = true_problem(self.problem)
+        Rule(self.problem.truth.accept if self.problem.truth else (), actual)
+        for problem in (self.problem, actual):
+            problem.intervals(self.times)
+
+    def _corners(self, index: int) -> list[tuple[Value, ...]]:
+        """Every value of one axis, with the first of all others."""
+        first = [axis.values[0] for axis in self.axes]
+        return [(*first[:index], value, *first[index + 1 :]) for value in self.axes[index].values]
+
+    # ---- the grid ------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _split(self) -> tuple[tuple[Axis, ...], tuple[Axis, ...]]:
+        return split([Axis(k, tuple(v)) for k, v in self.vary.items()], self.problem, self.estimators)
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """What is varied of the problem: a point is one value of each."""
+        return self._split[0]
+
+    @cached_property
+    def points(self) -> int:
+        return prod(len(axis.values) for axis in self.axes)
+
+    @property
+    def estimates(self) -> int:
+        """How many times something is estimated in all."""
+        return self.points * self.runs * len(self.variants)
+
+    def point(self, index: int) -> tuple[Value, ...]:
+        """Values of the axes at a point, the last axis fastest."""
+        out: list[Value] = []
+        for axis in reversed(self.axes):
+            index, i = divmod(index, len(axis.values))
+            out.append(axis.values[i])
+        return tuple(reversed(out))
+
+    def problems(self, index: int) -> tuple[Problem, Problem]:
+        """The problem as it is, and as it is believed to be, at a point."""
+        return problems_at(self.problem, self.axes, self.point(index))
+
+    @cached_property
+    def variants(self) -> dict[str, Any]:
+        """Every estimator with every combination of the settings that are varied and that it has, by its name here."""
+        out: dict[str, Any] = {}
+        for name, estimator in self.estimators.items():
+            own = [axis for axis in self._split[1] if axis.name in estimator_settings(estimator)]
+            for values in product(*(axis.values for axis in own)):
+                settings = dict(zip((axis.name for axis in own), values, strict=True))
+                made = variant(estimator, settings) if settings else estimator
+                out[_label(name, made, settings)] = made
+        return out
+
+    @cached_property
+    def rows(self) -> tuple[tuple[str, View], ...]:
+        """Name and view of every row of results: a window has two."""
+        return tuple((label, view) for label, estimator in self.variants.items() for view in views_of(estimator))
+
+    @cached_property
+    def groups(self) -> dict[str, tuple[int, ...]]:
+        """Columns of every group of states, or of every state where the model names no groups."""
+        model = self.problem.model
+        return dict(model.group_indices) or {name: (i,) for i, name in enumerate(model.names)}
+
+    @cached_property
+    def kept(self) -> Array:
+        """Indices of the epochs at which every run is kept, evenly spaced, first and last among them."""
+        K = len(self.times)
+        return np.unique(np.linspace(0, K - 1, min(K, MOST_EPOCHS)).round().astype(np.int64))
+
+    @property
+    def largest_piece(self) -> int:
+        """Runs that are worked on at once, so that memory stays flat."""
+        model, S = self.problem.model, len(self.problem.stations)
+        numbers = len(self.times) * (2 * model.n + 2 * len(self.groups) + 1 + 3 * S * model.width)
+        return int(max(8, _PIECE_BYTES // (8 * numbers)))
+
+    def run(self, path: str | os.PathLike[str], **options: Any) -> Stored:
+        """Run into a NetCDF file; see `piazzi.study.execute.run_study` for the options."""
+        from piazzi.study.execute import run_study
+
+        return run_study(self, path, **options)
+
+    # ---- what it is known by -------------------------------------------------------------------------------------
+
+    @cached_property
+    def specification(self) -> dict[str, Any]:
+        """Everything that the results depend on, as it is written into the store."""
+        return {
+            "schema": SCHEMA,
+            "name": self.name,
+            "runs": int(self.runs),
+            "seed": int(self.seed),
+            "estimators": {label: _described(e) for label, e in self.variants.items()},
+            "vary": {axis.name: list(axis.values) for axis in self.axes},
+            "times": hashlib.sha256(self.times.tobytes()).hexdigest(),
+            "problem": problem_to_tables(self.problem),
+        }
+
+    @cached_property
+    def digest(self) -> str:
+        """Hash of the specification."""
+        return hashlib.sha256(json.dumps(self.specification, sort_keys=True).encode()).hexdigest()
+
+
+def _named(given: Any) -> dict[str, Any]:
+    """Estimators by name; texts are parsed."""
+    pairs = given.items() if isinstance(given, Mapping) else [(str(text).strip(), text) for text in _listed(given)]
+    out = {name: parse(estimator) if isinstance(estimator, str) else estimator for name, estimator in pairs}
+    if not out:
+        raise ValueError("there are no estimators to study")
+    return out
+
+
+def _listed(given: Any) -> Sequence[Any]:
+    return [given] if isinstance(given, str) else list(given)
+
+
+def _label(name: str, estimator: Any, settings: Mapping[str, Value]) -> str:
+    """Name of an estimator with settings of its own: as the command line writes it, where it can."""
+    if isinstance(estimator, SlidingWindow) and name.partition(":")[0] == "window" and {*settings} <= {"lag", "iterations"}:
+        times = f"x{estimator.iterations}" if estimator.iterations > 1 else ""
+        return f"window:{estimator.lag}{times}"
+    return ":".join([name, *(f"{k}={v}" for k, v in settings.items())])
+
+
+def _described(estimator: Any) -> str:
+    kind = type(estimator)
+    settings = repr(estimator) if is_dataclass(estimator) else repr(sorted(vars(estimator).items()))
+    return f"{kind.__module__}.{kind.__qualname__}: {settings}"

@@ -1,0 +1,200 @@
+"""Where tasks run: in this process, or in worker processes that may die without taking anything with them."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import struct
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import IO, Protocol
+
+from piazzi.study.pieces import Piece, Task, run_task
+from piazzi.study.plan import Study
+
+_LENGTH = struct.Struct("<Q")
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of a task: its piece; or how its worker died; or what was raised, and whether all tasks will fare so."""
+
+    task: Task
+    piece: Piece | None = None
+    died: str = ""
+    error: str = ""
+    hopeless: bool = False
+
+
+class Hopeless(str):
+    """What a worker says where it can run no task at all."""
+
+
+class Workers(Protocol):
+    """Something that runs tasks."""
+
+    @property
+    def slots(self) -> int:
+        """How many tasks run at once."""
+
+    def submit(self, task: Task) -> None:
+        """Begin a task, at most `slots` at a time."""
+
+    def wait(self) -> list[Outcome]:
+        """Outcomes of at least one task."""
+
+    def close(self) -> None:
+        """End everything, whatever runs."""
+
+
+class Here:
+    """Tasks in this process, one at a time."""
+
+    slots = 1
+
+    def __init__(self, study: Study) -> None:
+        self._study, self._tasks = study, list[Task]()
+
+    def submit(self, task: Task) -> None:
+        self._tasks.append(task)
+
+    def wait(self) -> list[Outcome]:
+        task = self._tasks.pop(0)
+        return [Outcome(task, run_task(self._study, task))]
+
+    def close(self) -> None:
+        self._tasks.clear()
+
+
+class Processes:
+    """Worker processes, each with a thread that feeds it: a death is known at once, with the task that it was about.
+
+    They are new interpreters that import nothing of the caller's program, so a script needs no guard.  The second starts when
+    the first has finished a task: by then, every kernel is compiled.
+    """
+
+    def __init__(self, study: Study, count: int) -> None:
+        self.slots = count
+        self._first = pickle.dumps(study)
+        self._tasks: SimpleQueue[Task | None] = SimpleQueue()
+        self._outcomes: SimpleQueue[Outcome] = SimpleQueue()
+        self._processes: dict[int, subprocess.Popen[bytes]] = {}
+        self._warm, self._closed = threading.Event(), False
+        self._threads = [threading.Thread(target=self._serve, args=(i,), daemon=True) for i in range(count)]
+        for thread in self._threads:
+            thread.start()
+
+    def submit(self, task: Task) -> None:
+        self._tasks.put(task)
+
+    def wait(self) -> list[Outcome]:
+        while True:  # in short waits: a waiting main thread hears of Ctrl-C between them
+            with suppress(Empty):
+                found = [self._outcomes.get(timeout=0.2)]
+                while not self._outcomes.empty():
+                    found.append(self._outcomes.get())
+                return found
+
+    def close(self) -> None:
+        self._closed = True
+        self._warm.set()
+        for _ in self._threads:
+            self._tasks.put(None)
+        for process in list(self._processes.values()):
+            process.kill()
+        for thread in self._threads:
+            thread.join(timeout=5)
+
+    def pids(self) -> list[int]:
+        """Processes that are alive."""
+        return [p.pid for p in self._processes.values() if p.poll() is None]
+
+    def _serve(self, index: int) -> None:
+        if index:
+            self._warm.wait()
+        process: subprocess.Popen[bytes] | None = None
+        while not self._closed:
+            task = self._tasks.get()
+            if task is None:
+                break
+            if process is None or process.poll() is not None:
+                process = self._processes[index] = self._start()
+            self._outcomes.put(self._run(process, task))
+            self._warm.set()
+        if process is not None:
+            end(process)
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-c", "from piazzi.study.worker import main; main()"]
+        environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
+        environment["PYTHONPATH"] = os.pathsep.join(p for p in sys.path if p)
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
+
+    def _run(self, process: subprocess.Popen[bytes], task: Task) -> Outcome:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            if not hasattr(process, "piazzi_ready"):
+                send(process.stdin, self._first)
+                process.piazzi_ready = True  # type: ignore[attr-defined]
+            send(process.stdin, pickle.dumps(task))
+            answer = receive(process.stdout)
+        except (OSError, EOFError):
+            answer = None
+        if answer is None:
+            return Outcome(task, died=how_it_ended(end(process)))
+        result = pickle.loads(answer)
+        if isinstance(result, Piece):
+            return Outcome(task, result)
+        return Outcome(task, error=str(result), hopeless=isinstance(result, Hopeless))
+
+
+def end(process: subprocess.Popen[bytes]) -> int:
+    """End a process, if it has not ended, and close its streams; its exit status."""
+    process.kill()
+    status = process.wait()
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            with suppress(OSError):  # what a dead process never read
+                stream.close()
+    return status
+
+
+def send(stream: IO[bytes], data: bytes) -> None:
+    """Write one message."""
+    stream.write(_LENGTH.pack(len(data)))
+    stream.write(data)
+    stream.flush()
+
+
+def receive(stream: IO[bytes]) -> bytes | None:
+    """Read one message, None at the end of the stream."""
+    head = stream.read(_LENGTH.size)
+    if len(head) < _LENGTH.size:
+        return None
+    (length,) = _LENGTH.unpack(head)
+    data = stream.read(length)
+    return data if len(data) == length else None
+
+
+def how_it_ended(status: int) -> str:
+    """An exit status in words."""
+    if status >= 0:
+        return f"exit status {status}"
+    import signal
+
+    with suppress(ValueError):
+        return signal.Signals(-status).name
+    return f"signal {-status}"
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,187 @@
+"""A finished study in one NetCDF-4 file, written piece by piece, and read row by row."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piazzi.io import hdf5
+from piazzi.io.atomic import atomic_path
+from piazzi.problem.checks import Array
+from piazzi.study.log import Log
+from piazzi.study.plan import SCHEMA, Study
+from piazzi.study.score import NUMBERS
+
+if TYPE_CHECKING:
+    from piazzi.study.summary import Summary
+
+_RUNS_TOGETHER = 256
+_NOT_COMPARED = ("seconds",)
+MOST_MESSAGES = 10_000  # that are kept: which runs failed is known of all
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """What is stored of one estimator in one view at one point: arrays over runs, see `score.Scored`."""
+
+    numbers: Mapping[str, Array]
+    success: Array
+    diverged: Array
+    error: Array
+    nees: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """A finished study: what it was, and its results row by row.
+
+    Attributes
+    ----------
+    about : everything that is not a number over runs: specification, digest, rows, groups, units, states, axes, messages
+    times : (T,), epochs at which every run is kept, s
+    """
+
+    path: Path
+    about: Mapping[str, Any]
+    times: Array
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        return [(label, view) for label, view in self.about["rows"]]
+
+    @property
+    def points(self) -> list[list[Any]]:
+        """Values of the axes at every point."""
+        return list(self.about["points"])
+
+    @property
+    def groups(self) -> list[str]:
+        return list(self.about["groups"])
+
+    @cached_property
+    def summary(self) -> Summary:
+        """Who diverges how often, how far off they are, whether they know, what it costs."""
+        from piazzi.study.summary import Summary
+
+        return Summary(self)
+
+    def row(self, point: int, row: int) -> Row:
+        """Results of all runs; raises OSError, ValueError."""
+        with hdf5.opened(self.path) as root:
+            found = {name: hdf5.slab(root, name, (point, row)) for name in (*NUMBERS, "success", "diverged", "error", "nees")}
+        success, diverged = (found.pop(name).astype(bool) for name in ("success", "diverged"))
+        error, nees = found.pop("error"), found.pop("nees")
+        return Row(found, success, diverged, error, nees)
+
+    def bound(self, point: int, view: str) -> tuple[Array, Array, int]:
+        """Cramer-Rao bounds as standard deviations: at the epochs that are kept (T, G), and over the last half (G,).
+
+        Third, how many runs, the first ones, they were averaged over.
+        """
+        at = (point, ("realtime", "delayed").index(view))
+        with hdf5.opened(self.path) as root:
+            return hdf5.slab(root, "bound", at), hdf5.slab(root, "bound_last_half", at), int(hdf5.slab(root, "bound_runs", at))
+
+
+def write_store(path: str | os.PathLike[str], study: Study, log: Log) -> None:
+    """Write the finished study of a log, whole or not at all; raises OSError."""
+    import h5netcdf
+
+    messages: list[list[Any]] = []
+    lost = 0
+    with atomic_path(path) as work, h5netcdf.File(work, "w") as file:
+        _create(file, study)
+        for piece in log.pieces():
+            task = piece.task
+            if not task.count:
+                for name, values in piece.arrays.items():
+                    file.variables[name][task.point] = values
+                continue
+            for name, values in piece.arrays.items():
+                file.variables[name][task.point, :, task.first : task.first + task.count] = values
+            room = MOST_MESSAGES - len(messages)
+            messages += [[task.point, row, run, text] for row, run, text in piece.messages[:room]]
+            lost += max(0, len(piece.messages) - room)
+        _write_text(file, "about", {**_about(study), "messages": sorted(messages), "messages_left_out": lost})
+
+
+def read_store(path: str | os.PathLike[str]) -> Stored:
+    """The finished study in a file; raises OSError, or ValueError where it holds none."""
+    with hdf5.opened(path) as root:
+        about = hdf5.document(root, "about")
+        if about.get("schema") != SCHEMA:
+            raise ValueError("it holds no study")
+        times = hdf5.array(root, "time")
+        assert times is not None
+        return Stored(Path(path), about, times)
+
+
+def same_results(a: str | os.PathLike[str], b: str | os.PathLike[str]) -> list[str]:
+    """Names of what differs between two stores in any bit, wall-clock seconds aside."""
+    with hdf5.opened(a) as one, hdf5.opened(b) as other:
+        names = {*one, *other}
+        return sorted(name for name in names if name not in _NOT_COMPARED and not _same(one, other, name))
+
+
+def _same(one: Any, other: Any, name: str) -> bool:
+    if name not in one or name not in other or one[name].dtype != other[name].dtype or one[name].shape != other[name].shape:
+        return False
+    return bool(one[name][()].tobytes() == other[name][()].tobytes())
+
+
+def _about(study: Study) -> dict[str, Any]:
+    from importlib.metadata import version
+
+    model = study.problem.model
+    return {
+        "schema": SCHEMA,
+        "piazzi": version("piazzi"),
+        "specification": study.specification,
+        "digest": study.digest,
+        "rows": [list(row) for row in study.rows],
+        "axes": [axis.name for axis in study.axes],
+        "points": [list(study.point(i)) for i in range(study.points)],
+        "groups": list(study.groups),
+        "units": [sorted({model.unit(model.names[i]) for i in columns}) for columns in study.groups.values()],
+        "states": list(model.names),
+        "epochs": len(study.times),
+    }
+
+
+def _create(file: Any, study: Study) -> None:
+    """Dimensions and empty variables."""
+    T, G, R = len(study.kept), len(study.groups), len(study.rows)
+    sizes = {"point": study.points, "row": R, "run": study.runs, "epoch": T, "group": G, "view": 2}
+    file.dimensions = sizes
+    time = file.create_variable("time", ("epoch",), "f8", data=study.times[study.kept])
+    time.attrs["units"] = "s"
+    together = min(study.runs, _RUNS_TOGETHER)
+    per_run = ("point", "row", "run")
+    for name, grouped in NUMBERS.items():
+        dims = (*per_run, "group") if grouped else per_run
+        _variable(file, name, dims, "f8", (1, 1, together, G) if grouped else (1, 1, together), np.nan)
+    for name in ("success", "diverged"):
+        _variable(file, name, per_run, "u1", (1, 1, together), 0)
+    _variable(file, "error", (*per_run, "epoch", "group"), "f4", (1, 1, min(study.runs, 32), T, G), np.nan)
+    _variable(file, "nees", (*per_run, "epoch"), "f4", (1, 1, min(study.runs, 64), T), np.nan)
+    _variable(file, "bound", ("point", "view", "epoch", "group"), "f4", (1, 2, T, G), np.nan)
+    for name in ("bound_whole", "bound_last_half"):
+        _variable(file, name, ("point", "view", "group"), "f8", (1, 2, G), np.nan)
+    _variable(file, "bound_runs", ("point", "view"), "i8", (1, 2), 0)
+
+
+def _variable(file: Any, name: str, dims: tuple[str, ...], kind: str, chunks: tuple[int, ...], fill: float) -> None:
+    file.create_variable(name, dims, kind, chunks=chunks, fillvalue=np.dtype(kind).type(fill))
+
+
+def _write_text(file: Any, name: str, document: Mapping[str, Any]) -> None:
+    text = np.frombuffer(json.dumps(document).encode("ascii"), "S1")
+    file.dimensions[f"{name}_characters"] = len(text)
+    file.create_variable(name, (f"{name}_characters",), "S1", data=text)

@@ -1,0 +1,243 @@
+"""What a finished study says: who diverges how often, how far off they are, whether they know, and what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite, sqrt
+from typing import Any
+
+import numpy as np
+
+from piazzi.estimate.chi_square import quantile
+from piazzi.problem.checks import Array
+from piazzi.study.plan import SCHEMA
+from piazzi.study.store import Row, Stored
+
+QUANTILES = (0.05, 0.5, 0.95)
+CONFIDENCE = 0.95  # of the interval about a rate
+NEES_CONFIDENCE = 0.99  # of the bounds about a mean over runs
+_Z = 1.959963984540054  # half a normal's width that holds 95 %
+MOST_SHOWN = 20  # messages of failed runs
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One row of a study over time, at the T epochs that are kept.
+
+    Attributes
+    ----------
+    quantiles : (3, T, G), length of the error over runs at `QUANTILES`
+    rms : (T, G), root mean square over runs
+    bound : (T, G), Cramer-Rao bound, NaN where unknown
+    nees : (T,), mean over runs
+    nees_bounds : (2,), where that mean lies at one epoch with a probability of `NEES_CONFIDENCE` if errors are Gaussian with
+        the covariance that the estimator gives
+    """
+
+    quantiles: Array
+    rms: Array
+    bound: Array
+    nees: Array
+    nees_bounds: tuple[float, float]
+
+    @property
+    def inside(self) -> float | None:
+        """Share of the epochs at which the mean NEES is within its bounds."""
+        known = self.nees[np.isfinite(self.nees)]
+        if not known.size:
+            return None
+        return float(((known >= self.nees_bounds[0]) & (known <= self.nees_bounds[1])).mean())
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """One estimator in one view at one point, over its runs; None where there is nothing to tell.
+
+    Attributes
+    ----------
+    point : value of every axis
+    runs, failed, diverged : how many
+    diverged_interval : Wilson's 95 % interval for the rate of divergence among the runs that did not fail
+    rmse, rmse_last_half : by group, root mean square over runs
+    rmse_last_half_quantiles : by group, of single runs at `QUANTILES`
+    over_bound : by group, rmse_last_half over the Cramer-Rao bound, both of the runs that the bound is of
+    mean_nees, mean_nees_last_half, median_nees_last_half, mean_nis, seconds, iterations : over runs
+    """
+
+    point: Mapping[str, Any]
+    estimator: str
+    view: str
+    runs: int
+    failed: int
+    diverged: int
+    diverged_interval: tuple[float, float] | None
+    rmse: Mapping[str, float | None]
+    rmse_last_half: Mapping[str, float | None]
+    rmse_last_half_quantiles: Mapping[str, tuple[float, ...] | None]
+    over_bound: Mapping[str, float | None]
+    mean_nees: float | None
+    mean_nees_last_half: float | None
+    median_nees_last_half: float | None
+    mean_nis: float | None
+    seconds: float | None
+    iterations: float | None
+    course: Course
+
+    def to_dict(self) -> dict[str, Any]:
+        """The line in plain values."""
+        numbers = ("mean_nees", "mean_nees_last_half", "median_nees_last_half", "mean_nis", "seconds", "iterations")
+        groups = ("rmse", "rmse_last_half", "rmse_last_half_quantiles", "over_bound")
+        c = self.course
+        return {
+            "point": dict(self.point),
+            **{k: getattr(self, k) for k in ("estimator", "view", "runs", "failed", "diverged")},
+            "diverged_interval": None if self.diverged_interval is None else list(self.diverged_interval),
+            **{k: {g: list(v) if isinstance(v, tuple) else v for g, v in getattr(self, k).items()} for k in groups},
+            **{k: getattr(self, k) for k in numbers},
+            "nees_bounds": list(c.nees_bounds),
+            "nees_inside": c.inside,
+            "over_time": {
+                "nees": plain(c.nees),
+                **{
+                    g: {
+                        "quantiles": plain(c.quantiles[:, :, i]),
+                        "rms": plain(c.rms[:, i]),
+                        "bound": plain(c.bound[:, i]),
+                    }
+                    for i, g in enumerate(self.rmse)
+                },
+            },
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Summary:
+    """A study's results in short."""
+
+    stored: Stored
+
+    @cached_property
+    def lines(self) -> tuple[Line, ...]:
+        """A line for every point and row of the study, in order."""
+        stored = self.stored
+        axes = stored.about["axes"]
+        return tuple(
+            _line(stored, dict(zip(axes, values, strict=True)), point, row)
+            for point, values in enumerate(stored.points)
+            for row in range(len(stored.rows))
+        )
+
+    @property
+    def success(self) -> bool:
+        """Whether every run of every estimator finished."""
+        return not any(line.failed for line in self.lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object of schema piazzi.study/1."""
+        about = self.stored.about
+        specification = about["specification"]
+        return {
+            "schema": SCHEMA,
+            "source": specification["name"],
+            "runs": specification["runs"],
+            "seed": specification["seed"],
+            "epochs": about["epochs"],
+            "states": about["states"],
+            "axes": specification["vary"],
+            "digest": about["digest"],
+            "quantiles": list(QUANTILES),
+            "times": self.stored.times.tolist(),
+            "rows": [line.to_dict() for line in self.lines],
+            "messages": [
+                {"point": point, "estimator": stored_row[0], "view": stored_row[1], "run": run, "message": text}
+                for point, row, run, text in about["messages"][:MOST_SHOWN]
+                for stored_row in [self.stored.rows[row]]
+            ],
+        }
+
+
+def _line(stored: Stored, point: dict[str, Any], index: int, row: int) -> Line:
+    found, (label, view) = stored.row(index, row), stored.rows[row]
+    good, n, groups = found.success, len(stored.about["states"]), stored.groups
+    bound, bound_last_half, same = stored.bound(index, view)
+    done = int(good.sum())
+    lost = int((found.diverged & good).sum())
+    whole, half = (_rms(groups, found.numbers[k][good]) for k in ("rmse", "rmse_last_half"))
+    comparable = _rms(groups, found.numbers["rmse_last_half"][:same][good[:same]])
+    return Line(
+        point,
+        label,
+        view,
+        len(good),
+        len(good) - done,
+        lost,
+        wilson(lost, done),
+        whole,
+        half,
+        {g: _quantiles(found.numbers["rmse_last_half"][good, i]) for i, g in enumerate(groups)},
+        {g: _ratio(comparable[g], float(bound_last_half[i])) for i, g in enumerate(groups)},
+        _mean(found.numbers["mean_nees"][good]),
+        _mean(found.numbers["mean_nees_last_half"][good]),
+        _median(found.numbers["mean_nees_last_half"][good]),
+        _mean(found.numbers["mean_nis"][good]),
+        _mean(found.numbers["seconds"][good]),
+        _mean(found.numbers["iterations"][good]),
+        _course(found, n, bound),
+    )
+
+
+def _course(row: Row, n: int, bound: Array) -> Course:
+    error, nees = row.error[row.success].astype(float), row.nees[row.success].astype(float)
+    M, (T, G) = len(error), row.error.shape[1:]
+    if not M:
+        nothing = np.full((T, G), np.nan)
+        return Course(np.full((len(QUANTILES), T, G), np.nan), nothing, bound, np.full(T, np.nan), (0.0, 0.0))
+    each = (1 - NEES_CONFIDENCE) / 2
+    bounds = (quantile(each, float(n * M)) / M, quantile(1 - each, float(n * M)) / M)
+    return Course(np.quantile(error, QUANTILES, axis=0), np.sqrt((error**2).mean(axis=0)), bound, nees.mean(axis=0), bounds)
+
+
+def wilson(count: int, of: int) -> tuple[float, float] | None:
+    """Interval of `CONFIDENCE` for a rate seen `count` times `of` times (Wilson, J. American Statistical Assoc. 22, 1927)."""
+    if not of:
+        return None
+    rate, spread = count / of, _Z**2 / of
+    middle = (rate + spread / 2) / (1 + spread)
+    half = _Z * sqrt(rate * (1 - rate) / of + spread / (4 * of)) / (1 + spread)
+    return (max(0.0, middle - half) if count else 0.0, min(1.0, middle + half) if count < of else 1.0)
+
+
+def _rms(groups: list[str], values: Array) -> dict[str, float | None]:
+    return {g: _finite(sqrt(float((values[:, i] ** 2).mean()))) if len(values) else None for i, g in enumerate(groups)}
+
+
+def _quantiles(values: Array) -> tuple[float, ...] | None:
+    known = values[np.isfinite(values)]
+    return tuple(np.quantile(known, QUANTILES).tolist()) if known.size else None
+
+
+def _mean(values: Array) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else None
+
+
+def _median(values: Array) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else None
+
+
+def _ratio(value: float | None, bound: float) -> float | None:
+    return value / bound if value is not None and isfinite(bound) and bound > 0 else None
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def plain(values: Array) -> Any:
+    """Nested lists for JSON, None where a number is not finite."""
+    if values.ndim > 1:
+        return [plain(part) for part in values]
+    return [float(f"{v:.7g}") if isfinite(v) else None for v in values.tolist()]

@@ -1,0 +1,234 @@
+"""Whole studies in processes: the same bits however they are run, interrupted and continued."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from piazzi.study import read_store, run_study, same_results
+from piazzi.study.pieces import Task, simulated
+from piazzi.study.pool import Processes
+from tests.study.estimators import Poison
+from tests.study.studies import small
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A study, and its store made in this process."""
+    study = small(runs=60, vary={"R.scale": [1, 4]})
+    path = tmp_path_factory.mktemp("whole") / "study.nc"
+    run_study(study, path, workers=0, chunk=60)
+    return study, path
+
+
+@pytest.mark.parametrize(("workers", "chunk"), [(0, 7), (1, None), (2, None), (2, 1)])
+def test_same_bits_with_any_workers_and_chunks(whole, tmp_path, workers, chunk):
+    study, expected = whole
+    run_study(study, tmp_path / "s.nc", workers=workers, chunk=chunk)
+    assert same_results(expected, tmp_path / "s.nc") == []
+    assert os.listdir(tmp_path) == ["s.nc"]
+
+
+def test_comparison_of_stores_sees_a_changed_bit(whole, tmp_path):
+    _, expected = whole
+    run_study(small(runs=60, vary={"R.scale": [1, 4]}, seed=1), tmp_path / "s.nc", workers=0)
+    differ = same_results(expected, tmp_path / "s.nc")
+    assert {"rmse", "error", "nees", "bound", "about"} <= set(differ)
+    assert "seconds" not in differ
+
+
+def test_interrupted_and_resumed_is_the_same_and_computes_nothing_twice(whole, tmp_path, monkeypatch):
+    study, expected = whole
+    path, done = tmp_path / "s.nc", []
+
+    def stop(finished, total):
+        if finished >= 40:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(study, path, workers=0, chunk=8, progress=stop)
+    assert not path.exists()
+    from piazzi.study import kept_runs, pieces, pool
+
+    assert kept_runs(path) == 40
+    monkeypatch.setattr(pool, "run_task", lambda s, task: done.append(task) or pieces.run_task(s, task))
+    run_study(study, path, workers=0, chunk=11, resume=True)
+    assert same_results(expected, path) == []
+    assert sum(task.count for task in done) == 120 - 40
+    done.clear()
+    run_study(study, path, workers=0, resume=True)
+    assert done == []
+
+
+def test_other_studies_stores_are_refused(whole, tmp_path):
+    study, expected = whole
+    other = small(runs=61, vary={"R.scale": [1, 4]})
+    for resume in (False, True):
+        with pytest.raises(ValueError, match="holds another study: runs is 60 there and 61 here"):
+            run_study(other, expected, workers=0, resume=resume)
+    with pytest.raises(ValueError, match="holds this study, finished: --resume shows it"):
+        run_study(study, expected, workers=0)
+    with pytest.raises(KeyboardInterrupt):
+        run_study(study, tmp_path / "s.nc", workers=0, chunk=8, progress=_interrupt_after(8))
+    with pytest.raises(ValueError, match="was not finished: --resume goes on with it"):
+        run_study(study, tmp_path / "s.nc", workers=0)
+    with pytest.raises(ValueError, match="has runs of another study: seed is 0 there and 5 here"):
+        run_study(small(runs=60, vary={"R.scale": [1, 4]}, seed=5), tmp_path / "s.nc", workers=0, resume=True)
+    with pytest.raises(ValueError, match="its problem is not the same"):
+        changed = small(
+            runs=60,
+            vary={"R.scale": [1, 4]},
+            problem=study.problem.__class__(**_fields(study.problem, name="x", prior_time=-1.0)),
+        )
+        run_study(changed, expected, workers=0, resume=True)
+
+
+def _fields(problem, **changes):
+    from dataclasses import fields
+
+    return {f.name: getattr(problem, f.name) for f in fields(problem)} | changes
+
+
+def _interrupt_after(count):
+    def stop(finished, total):
+        if finished >= count:
+            raise KeyboardInterrupt
+
+    return stop
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written_is_told_before_anything_runs(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(PermissionError):
+        run_study(small(), tmp_path / "s.nc", workers=0)
+    tmp_path.chmod(0o700)
+
+
+@pytest.mark.parametrize(("path", "message"), [("s.txt", "kept in a .nc file"), ("no/s.nc", "no folder")])
+def test_places_that_make_no_sense(tmp_path, path, message):
+    with pytest.raises((ValueError, OSError), match=message):
+        run_study(small(), tmp_path / path, workers=0)
+
+
+def test_a_poisoned_run_is_reported_and_the_others_are_all_there(tmp_path):
+    plain = small(runs=30, estimators=("ekf",))
+    first = float(simulated(plain, Task(0, 13, 1)).z[0, 0, 0])
+    study = small(runs=30, estimators={"ekf": "ekf", "poison": Poison(first)})
+    stored = run_study(study, tmp_path / "s.nc", workers=2, chunk=10)
+    assert [m[2:] for m in stored.about["messages"]] == [[13, "killed its worker (SIGKILL), 3 times"]] * 2
+    for row in (0, 1):
+        success = stored.row(0, row).success
+        assert not success[13]
+        assert success.sum() == 29
+    reference = run_study(plain, tmp_path / "plain.nc", workers=0).row(0, 0)
+    others = np.arange(30) != 13
+    np.testing.assert_array_equal(stored.row(0, 0).error[others], reference.error[others])
+
+
+def test_a_study_that_workers_cannot_read_ends_at_once(tmp_path):
+    script = tmp_path / "own.py"
+    script.write_text(
+        "from dataclasses import dataclass\nimport numpy as np, piazzi as pz\nfrom tests.study.studies import small\n"
+        "@dataclass(frozen=True)\nclass Mine:\n    def estimate(self, problem, tracking):\n        return None\n"
+        "try:\n    small(estimators={'mine': Mine()}).run('s.nc', workers=1)\n"
+        "except RuntimeError as error:\n    print(error)\n"
+    )
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, script], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=120)
+    assert re.fullmatch("a worker cannot read the study: AttributeError.*Mine.*\n", done.stdout), done
+    assert os.listdir(tmp_path) == ["own.py"]
+
+
+@pytest.mark.slow
+def test_a_worker_killed_from_outside_takes_nothing_along(whole, tmp_path, monkeypatch):
+    study, expected = whole
+    teams, killed = [], []
+    original = Processes.__init__
+
+    def remember(self, *args):
+        original(self, *args)
+        teams.append(self)
+
+    def kill(finished, total):
+        pids = teams[0].pids() if teams else []
+        if pids and len(killed) < 5:
+            os.kill(pids[len(killed) % len(pids)], signal.SIGKILL)
+            killed.append(finished)
+
+    monkeypatch.setattr(Processes, "__init__", remember)
+    stored = run_study(study, tmp_path / "s.nc", workers=2, chunk=6, progress=kill)
+    assert len(killed) == 5
+    assert stored.about["messages"] == []
+    assert same_results(expected, tmp_path / "s.nc") == []
+
+
+@pytest.mark.slow
+def test_killed_at_ten_random_moments_and_resumed(tmp_path):
+    """SIGKILL of the main process, ten times in one study, at moments from its start to its end."""
+    arguments = ["study", "b612-range", "--runs", "3000", "--with", "ekf", "--with", "window:10", "--workers", "1"]
+    command = [sys.executable, "-m", "piazzi", *arguments]
+    started = time.monotonic()
+    subprocess.run([*command, "-o", tmp_path / "whole.nc"], check=True, capture_output=True)
+    seconds = time.monotonic() - started
+    rng, deaths = np.random.default_rng(0), 0
+    while deaths < 10:
+        process = subprocess.Popen(
+            [*command, "-o", tmp_path / "s.nc", "--resume", "--chunk", "25"],
+            stderr=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+        )
+        try:
+            process.wait(rng.uniform(0.02, 0.5) * seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            deaths += 1
+        if process.wait() == 0:
+            os.unlink(tmp_path / "s.nc")  # it was through: again
+    last = subprocess.run([*command, "-o", tmp_path / "s.nc", "--resume"], check=False, capture_output=True, text=True)
+    assert last.returncode == 0, last.stderr
+    assert same_results(tmp_path / "whole.nc", tmp_path / "s.nc") == []
+    assert sorted(os.listdir(tmp_path)) == ["s.nc", "whole.nc"]
+    assert read_store(tmp_path / "s.nc").row(0, 0).success.all()
+
+
+@pytest.mark.slow
+def test_workers_end_with_the_process_that_started_them(tmp_path):
+    command = [sys.executable, "-m", "piazzi", "study", "b612-range", "--runs", "100000", "--with", "graph", "--workers", "2"]
+    process = subprocess.Popen([*command, "-o", tmp_path / "s.nc"], stderr=subprocess.DEVNULL)
+    try:
+        for _ in range(600):
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+            found = _descendants(process.pid) if children.exists() else []
+            if len(found) >= 2:
+                break
+            time.sleep(0.1)
+        assert len(found) >= 2
+    finally:
+        process.kill()
+        process.wait()
+    for _ in range(300):
+        if not any(_alive(pid) for pid in found):
+            return
+        time.sleep(0.1)
+    raise AssertionError("workers outlive their parent")
+
+
+def _descendants(pid):
+    tasks = Path(f"/proc/{pid}/task")
+    return [int(child) for task in tasks.iterdir() for child in (task / "children").read_text().split()]
+
+
+def _alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

@@ -1,0 +1,132 @@
+"""The file of finished runs: whole records or none, whatever ends the process or fills the disk."""
+
+import errno
+import os
+import shutil
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from piazzi.study.log import Log
+from piazzi.study.pieces import Piece, Task
+
+SPECIFICATION = {"runs": 9}
+
+
+def piece(first, count=3):
+    rng = np.random.default_rng(first)
+    arrays = {
+        "a": rng.standard_normal((2, count, 4)),
+        "b": rng.integers(0, 2, (2, count)).astype(np.uint8),
+        "none": np.empty((2, 0)),
+    }
+    return Piece(Task(1, first, count), arrays, ((0, first, "why \u2026 \n"),))
+
+
+def same(one, other):
+    assert (one.task, one.messages) == (other.task, other.messages)
+    for name, values in one.arrays.items():
+        assert other.arrays[name].dtype == values.dtype
+        assert_array_equal(other.arrays[name], values)
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "study.nc.runs"
+    log = Log.create(path, SPECIFICATION)
+    for first in (0, 3, 6):
+        log.append(piece(first))
+    log.close()
+    return path
+
+
+def test_pieces_come_back(path):
+    log = Log.open(path)
+    assert log.specification == SPECIFICATION
+    for found, first in zip(log.pieces(), (0, 3, 6), strict=True):
+        same(piece(first), found)
+    log.close()
+
+
+def test_cut_anywhere_leaves_the_whole_records_before(path, tmp_path):
+    whole = path.read_bytes()
+    log = Log.open(path)
+    ends = [entry.offset for entry in log.entries] + [len(whole)]
+    log.close()
+    for length in {*range(ends[0], len(whole), 37), *ends, *(e - 1 for e in ends[1:])}:
+        cut = tmp_path / "cut.runs"
+        cut.write_bytes(whole[:length])
+        log = Log.open(cut)
+        count = sum(end <= length for end in ends[1:])
+        assert [entry.task.first for entry in log.entries] == [0, 3, 6][:count]
+        assert cut.stat().st_size == ends[count]
+        log.append(piece(99))
+        same(piece(99), log.read(log.entries[-1]))
+        log.close()
+
+
+def test_a_flipped_bit_is_found(path):
+    data = bytearray(path.read_bytes())
+    data[-5] ^= 1
+    path.write_bytes(data)
+    log = Log.open(path)
+    assert [entry.task.first for entry in log.entries] == [0, 3]
+    log.close()
+
+
+@pytest.mark.parametrize("content", [b"", b"x", b"PZRUNS1\n" + b"\xff" * 100, b"\0" * 1000])
+def test_another_file_is_refused_and_left_alone(tmp_path, content):
+    path = tmp_path / "other.runs"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match="no runs of a study"):
+        Log.open(path)
+    assert path.read_bytes() == content
+
+
+def test_only_one_process_at_a_time(path):
+    log = Log.open(path)
+    with pytest.raises(ValueError, match="another process is running this study"):
+        Log.open(path)
+    log.close()
+    Log.open(path).close()
+
+
+def test_a_full_disk_takes_nothing_away(path, monkeypatch):
+    """Writes end in the middle of the record, as they do on a full disk."""
+    log = Log.open(path)
+
+    class Full:
+        def __init__(self, file):
+            self.file, self.room = file, 100
+
+        def __getattr__(self, name):
+            return getattr(self.file, name)
+
+        def write(self, data):
+            if not self.room:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            written = self.file.write(data[: self.room])
+            self.room -= written
+            return written
+
+    log._file = Full(log._file)
+    before = path.stat().st_size
+    with pytest.raises(OSError, match="No space left on device") as caught:
+        log.append(piece(50))
+    assert caught.value.filename == str(path)
+    assert path.stat().st_size == before
+    log.close()
+    again = Log.open(path)
+    assert [entry.task.first for entry in again.entries] == [0, 3, 6]
+    again.close()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
+def test_a_really_full_disk(monkeypatch, tmp_path):
+    """/dev/full refuses every write, as a full disk does."""
+    path = tmp_path / "study.nc.runs"
+    os.symlink("/dev/full", path)
+    with pytest.raises(OSError):
+        Log.create(path, SPECIFICATION)
+    assert shutil.disk_usage(tmp_path).total > 0

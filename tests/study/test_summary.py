@@ -1,0 +1,100 @@
+"""What a study says, against the same made from its runs by other means."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from piazzi.study import run_study
+from piazzi.study.summary import QUANTILES, wilson
+from tests.study.estimators import Refusing
+from tests.study.studies import small
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    study = small(runs=50, estimators={"ekf": "ekf", "window:5": "window:5", "picky": Refusing(1.5)}, vary={"R.scale": [1, 4]})
+    return run_study(study, tmp_path_factory.mktemp("s") / "s.nc", workers=0)
+
+
+def test_lines_are_points_times_rows(stored):
+    lines = stored.summary.lines
+    assert [(line.point["R.scale"], line.estimator, line.view) for line in lines] == [
+        (scale, *row) for scale in (1, 4) for row in stored.rows
+    ]
+    assert not stored.summary.success
+
+
+def test_numbers_over_runs(stored):
+    line, row = stored.summary.lines[0], stored.row(0, 0)
+    assert (line.runs, line.failed) == (50, 0)
+    half = row.numbers["rmse_last_half"][:, 0]
+    assert line.rmse_last_half["position"] == pytest.approx(np.sqrt(np.mean(half**2)))
+    assert_allclose(line.rmse_last_half_quantiles["position"], np.quantile(half, QUANTILES))
+    bound, bound_last_half, count = stored.bound(0, "realtime")
+    assert count == 50
+    assert line.over_bound["position"] == pytest.approx(np.sqrt(np.mean(half**2)) / bound_last_half[0])
+    assert_allclose(line.course.bound, bound)
+    assert_allclose(line.course.rms, np.sqrt((row.error.astype(float) ** 2).mean(axis=0)))
+    assert line.mean_nees == pytest.approx(row.numbers["mean_nees"].mean())
+    assert line.seconds > 0
+
+
+def test_failed_runs_are_counted_and_left_out(stored):
+    line, row = stored.summary.lines[3], stored.row(0, 3)
+    assert line.failed == (~row.success).sum() > 0
+    assert line.mean_nis == pytest.approx(row.numbers["mean_nis"][row.success].mean())
+    assert np.isfinite(line.course.rms).all()
+
+
+def test_bounds_of_mean_nees_hold_for_gaussian_errors():
+    """99 % of means of M chi-square variables of n degrees of freedom."""
+    from piazzi.study.store import Row
+    from piazzi.study.summary import _course
+
+    rng = np.random.default_rng(0)
+    M, T, n = 40, 4000, 4
+    nees = rng.chisquare(n, (M, T))
+    row = Row({}, np.ones(M, bool), np.zeros(M, bool), np.ones((M, T, 1)), nees)
+    inside = _course(row, n, np.ones((T, 1))).inside
+    assert inside == pytest.approx(0.99, abs=5 * np.sqrt(0.99 * 0.01 / T))
+
+
+@pytest.mark.parametrize("count", [0, 1, 10, 99, 100])
+def test_interval_of_a_rate_solves_wilsons_equation(count):
+    """Its ends are the rates p with |count/of - p| = z sqrt(p (1 - p) / of)."""
+    low, high = wilson(count, 100)
+    assert 0 <= low <= count / 100 <= high <= 1
+    for p in (low, high):
+        if 0 < p < 1:
+            assert abs(count / 100 - p) == pytest.approx(1.959963984540054 * np.sqrt(p * (1 - p) / 100), rel=1e-9)
+    assert wilson(0, 0) is None
+
+
+def test_interval_covers_the_rate_it_should():
+    """Over many experiments with a rate of 10 %, 95 % of the intervals hold it, but for the grain of counts."""
+    seen = np.random.default_rng(1).binomial(200, 0.1, 4000)
+    held = np.mean([low <= 0.1 <= high for low, high in (wilson(int(c), 200) for c in seen)])
+    assert 0.93 < held < 0.97
+
+
+def test_json_is_strict_and_complete(stored):
+    document = json.loads(json.dumps(stored.summary.to_dict(), allow_nan=False))
+    assert document["schema"] == "piazzi.study/1"
+    assert (document["runs"], document["epochs"], document["axes"]) == (50, 30, {"R.scale": [1, 4]})
+    row = document["rows"][0]
+    assert {"failed", "diverged", "diverged_interval", "rmse", "over_bound", "nees_bounds", "nees_inside", "seconds"} <= {*row}
+    assert len(row["over_time"]["position"]["quantiles"]) == 3
+    assert len(row["over_time"]["nees"]) == len(document["times"]) == 30
+    assert document["messages"][0]["estimator"] == "picky"
+
+
+def test_any_netcdf_reader_opens_a_store(stored):
+    import xarray
+
+    expected = stored.row(1, 2).numbers["rmse"]
+    with xarray.open_dataset(stored.path) as found:
+        assert found["rmse"].dims == ("point", "row", "run", "group")
+        assert found["error"].dims == ("point", "row", "run", "epoch", "group")
+        assert_allclose(found["rmse"].values[1, 2], expected)
