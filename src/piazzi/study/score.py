@@ -8,8 +8,8 @@ import numpy as np
 
 from piazzi.estimate import Estimate
 from piazzi.estimate.chi_square import quantile
-from piazzi.evaluate.comparison import evaluate
 from piazzi.evaluate.metrics import FAR, errors, known_truth, squared_in_sigmas
+from piazzi.evaluate.rows import evaluate
 from piazzi.problem.checks import Array
 from piazzi.study.lanes import Scores
 
@@ -81,7 +81,7 @@ def _root_mean(squared: Array) -> Array:
 
 def score_estimate(name: str, estimate: Estimate, groups: dict[str, tuple[int, ...]], kept: Array) -> tuple[Scored, str]:
     """Scores of one run, M = 1, and why it failed, "" where it did not."""
-    row = evaluate(name, estimate)
+    row = evaluate(name, estimate, thorough=False)
     out = nothing(1, len(groups), len(kept))
     for key, values in (("rmse", row.rmse), ("rmse_last_half", row.rmse_last_half)):
         out.numbers[key][0] = [_number(values.get(group)) for group in groups]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate.chi_square import quantile
+from piazzi.evaluate.consistency import epoch_bounds
 from piazzi.problem.checks import Array
 from piazzi.study.plan import SCHEMA
 from piazzi.study.store import Row, Stored
@@ -194,8 +194,8 @@ def _course(row: Row, n: int, bound: Array) -> Course:
     if not M:
         nothing = np.full((T, G), np.nan)
         return Course(np.full((len(QUANTILES), T, G), np.nan), nothing, bound, np.full(T, np.nan), (0.0, 0.0))
-    each = (1 - NEES_CONFIDENCE) / 2
-    bounds = (quantile(each, float(n * M)) / M, quantile(1 - each, float(n * M)) / M)
+    low, high = epoch_bounds(np.array([n]), M, NEES_CONFIDENCE)
+    bounds = (float(low[0]), float(high[0]))
     return Course(np.quantile(error, QUANTILES, axis=0), np.sqrt((error**2).mean(axis=0)), bound, nees.mean(axis=0), bounds)
 
 
