@@ -200,3 +200,12 @@ def test_long_steps_are_warned_of_in_one_line(call, tmp_path):
             assert line.startswith(f"piazzi: warning: {name}: the integrator's steps are too long: 4 times as many move '")
             assert result.document["rows"][0]["success"]
     assert call("estimate", coarse, "--json").said == []
+
+
+def test_the_rows_of_a_comparison_with_a_gate_are_one_table(call, tmp_path):
+    """The column of rejected rows is there for all, whoever comes first."""
+    result = call("compare", SCENARIO, "--with", "ekf", "--with", "ekf:gate=0.9", "-o", tmp_path / "rows.csv")
+    assert result.status == 0
+    plain, gated = csv.DictReader((tmp_path / "rows.csv").read_text().splitlines())
+    assert plain["rejected"] == ""
+    assert f"The gate of ekf:gate=0.9 rejected {gated['rejected']} of 100 measurements." in result.out

@@ -259,3 +259,12 @@ def test_html_escapes_what_users_wrote(good):
     assert "<script>" not in page
     assert "&lt;script&gt;" in page
     assert page.count("<tr>") == 2
+
+
+def test_what_a_gate_rejected_is_told(good):
+    gated = replace(good, details={"rejected": np.zeros(len(good.innovations), dtype=bool), "rejected_count": 3})
+    comparison = compared(plain=good, gated=gated)
+    plain, row = comparison.to_dict()["rows"]
+    assert "rejected" not in plain
+    assert row["rejected"] == 3
+    assert f"The gate of gated rejected 3 of {len(good.tracking.row_times)} measurements." in str(comparison)

@@ -82,6 +82,7 @@ class _Run:
     skip: int = 0
     taken: int = 0
     refused: int = 0
+    rejected: int = 0
     bad: int = 0
     saved_at: float = 0.0
     resumed: bool = False
@@ -179,6 +180,9 @@ class _Run:
             say((text if text.startswith("line ") else f"line {self.lines}: {text}") + "; skipped")
             return
         self.taken += 1
+        if getattr(self.session, "rejected", False):
+            self.rejected += 1
+            say(f"line {self.lines}: {row.station} at t = {row.time:g} s is beyond the gate; rejected")
         self._write(row)
         self.save()
 
@@ -206,10 +210,15 @@ class _Run:
 
     def summary(self) -> str:
         """What became of the lines."""
-        parts = [f"{self.taken} measurements taken"]
+        parts = [f"{_counted(self.taken, 'measurement')} taken"]
+        parts += [f"{self.rejected} rejected by the gate"] if self.rejected else []
         parts += [f"{self.refused} refused as too old"] if self.refused else []
-        parts += [f"{self.bad} lines skipped"] if self.bad else []
+        parts += [f"{_counted(self.bad, 'line')} skipped"] if self.bad else []
         return ", ".join(parts)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def _finite(value: Any) -> Any:

@@ -88,13 +88,13 @@ def write_json(path: str, value: Any) -> None:
 
 
 def write_csv(path: str, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Rows with the same keys as CSV, None as an empty cell, all at once."""
+    """Rows by their keys as CSV, None and what a row does not have as empty cells, all at once."""
     import csv
 
     from piazzi.io.atomic import atomic_path
 
     with atomic_path(path) as work, open(work, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]) if rows else [])
+        writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
         writer.writeheader()
         writer.writerows(rows)
 

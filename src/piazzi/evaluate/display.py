@@ -194,6 +194,7 @@ def sentences(comparison: Comparison) -> list[str]:
     out = [f"{r.estimator} did not succeed: {r.message}." for r in comparison.rows if not r.success]
     wayward = dict.fromkeys(r.estimator for r in comparison.rows if r.success and r.diverged)
     out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down." for name in wayward]
+    out += _rejected(comparison)
     if any(v is not None for r in sound for v in r.rmse.values()):
         out += [*_best(comparison, sound), *_honest(comparison, sound)]
     elif sound:
@@ -214,6 +215,13 @@ def _tested(rows: Sequence[Row]) -> list[str]:
         return out
     who = "All others pass" if out else f"{passed[0]} passes" if len(passed) == 1 else "All pass"
     return [*out, f"{who} all tests of honesty (NEES, NIS, whiteness, bias; 5 % level)."]
+
+
+def _rejected(comparison: Comparison) -> list[str]:
+    """How many rows each gate left out."""
+    total = len(comparison.tracking.row_times)
+    counts = {r.estimator: r.rejected for r in comparison.rows if r.rejected is not None}
+    return [f"The gate of {name} rejected {count:,} of {total:,} measurements." for name, count in counts.items()]
 
 
 def _without_truth(comparison: Comparison, rows: Sequence[Row]) -> list[str]:

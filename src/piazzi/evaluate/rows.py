@@ -32,6 +32,7 @@ class Row:
     convergence_time : seconds until the error of the first group stays, in the RMS of all that follows, within twice its last
         half's
     diverged : see `piazzi.evaluate.has_diverged`
+    rejected : rows of measurements that a gate left out; None, and no part of the dictionary, where there is no gate
     """
 
     estimator: str
@@ -50,6 +51,7 @@ class Row:
     crlb_last_half: Mapping[str, float | None] = field(default_factory=dict)
     convergence_time: float | None = None
     honesty: Honesty = field(default_factory=Honesty)
+    rejected: int | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The row in the contract's names, numbers that are not finite as None."""
@@ -63,7 +65,8 @@ class Row:
         out |= {f"{g}_crlb": finite(self.crlb.get(g)) for g in names}
         out |= {f"{g}_crlb_last_half": finite(self.crlb_last_half.get(g)) for g in names}
         out["convergence_time"] = finite(self.convergence_time)
-        return out | _tests(self.honesty)
+        out |= _tests(self.honesty)
+        return out if self.rejected is None else out | {"rejected": self.rejected}
 
 
 def _tests(found: Honesty) -> dict[str, float | None]:
@@ -119,6 +122,7 @@ def evaluate(name: str, estimate: Estimate, bounds: Bounds | None = None, *, tho
         if lost or error is None
         else convergence_time(error, next(iter(columns.values())), estimate.times),
         honesty=judged(estimate, consistency) if thorough else Honesty(),
+        rejected=estimate.details.get("rejected_count"),
     )
 
 

@@ -44,8 +44,10 @@ class RowReader:
 
 
 def _one_of_each(header: list[str], problem: Problem) -> bytes:
-    """A row that any good header accepts: for checking the header alone."""
-    station = problem.stations[0].name if problem.stations else ""
-    own = set(problem.model.sensor(problem.stations[0].sensor).components) if problem.stations else set()
-    cells = [station if h == "station" else "1" if h.split("[")[0].strip() in own or h == "time" else "" for h in header]
+    """A row that any good header accepts, of a station that measures one of its columns: for checking the header alone."""
+    labels = [h.split("[")[0].strip() for h in header]
+    components = {s.name: problem.model.sensor(s.sensor).components for s in problem.stations}
+    station = next((name for name, own in components.items() if not {*own}.isdisjoint(labels)), next(iter(components), ""))
+    filled = {"time", *components.get(station, ())}
+    cells = [station if label == "station" else "1" if label in filled else "" for label in labels]
     return ",".join(cells).encode()

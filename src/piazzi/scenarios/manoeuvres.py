@@ -25,7 +25,7 @@ def read_manoeuvres(table: Table, physics: Physics, units: Units) -> list[Manoeu
 
 
 def _manoeuvre(table: Table, physics: Physics, units: Units) -> Manoeuvre | None:
-    states = _states(table, physics)
+    states = named_states(table, physics)
     time = table.number("time", units.time())
     if table.raw("time") is None:
         table.fault("time", "is missing")
@@ -40,8 +40,8 @@ def _manoeuvre(table: Table, physics: Physics, units: Units) -> Manoeuvre | None
     return Manoeuvre(time, delta * factors, spread, tuple(states))
 
 
-def _states(table: Table, physics: Physics) -> Sequence[str]:
-    """The states that jump: those of a group, or those named; none after a fault."""
+def named_states(table: Table, physics: Physics) -> Sequence[str]:
+    """States under the key "states": those of a group (default "velocity"), or those named; none after a fault."""
     given = VELOCITY if table.raw("states") is None else table.raw("states")
     if isinstance(given, str):
         if given not in physics.groups:

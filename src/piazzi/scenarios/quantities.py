@@ -98,6 +98,8 @@ def read_station(table: Table, physics: Physics) -> Station | None:
     if sensor is not None and not sensors:
         table.fault("sensor", f"is {shown(sensor)}, but there are no sensors")
     if sensor not in physics.components:
+        if isinstance(table.raw("noise"), Mapping):
+            table.table("noise").finish(SPREADS)
         table.finish(("noise", "numbers"))
         return None
     components, own = physics.components[sensor], physics.numbers[sensor]

@@ -11,6 +11,7 @@ from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.scenarios.equations import read_physics
 from piazzi.scenarios.faults import Faults
+from piazzi.scenarios.gauss_markov import read_gauss_markov
 from piazzi.scenarios.integrators import read_integrator
 from piazzi.scenarios.manoeuvres import read_manoeuvres
 from piazzi.scenarios.quantities import read_noise, read_parameters, read_prior, read_stations
@@ -23,7 +24,7 @@ from piazzi.scenarios.units import Units
 
 SECTIONS = (
     "title", "units", "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior",
-    "process_noise", "integrator", "manoeuvres", "times", "truth", "picture", "study",
+    "process_noise", "gauss_markov", "integrator", "manoeuvres", "times", "truth", "picture", "study",
 )  # fmt: skip
 MAX_STEPS = 10**10
 MAX_ROWS = 2 * 10**7
@@ -60,13 +61,16 @@ def read_problem(file: Table, name: str, units: Units) -> Problem | None:
     stations = read_stations(file, physics)
     prior, prior_time = read_prior(file.table("prior"), physics, file.table("truth"), units)
     noise = read_noise(file.table("process_noise"), physics) if "process_noise" in file else None
+    wandering = read_gauss_markov(file.table("gauss_markov"), physics, units) if "gauss_markov" in file else None
     manoeuvres = read_manoeuvres(file, physics, units)
     truth = read_truth(file.table("truth"), physics, prior, units) if "truth" in file else None
     if len(file.faults) > before or physics.model is None or prior is None:
         return None
     with file.faults.at(""):
         places = [s for s in stations if s is not None]
-        return Problem(physics.model, prior, noise, places, parameters, integrator, prior_time, truth, name, manoeuvres)
+        problem = Problem(physics.model, prior, noise, places, parameters, integrator, prior_time, truth, name, manoeuvres)
+        with file.faults.at("gauss_markov"):
+            return problem if wandering is None else wandering.added_to(problem)
     return None
 
 
