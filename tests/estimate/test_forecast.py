@@ -106,6 +106,20 @@ def test_values_that_are_known_do_not_grow():
     assert_array_equal(pz.Smoother().estimate(problem, pz.Tracking([0.0], [0.1])).predict(1.0).growth, [[np.inf, np.inf]])
 
 
+@pytest.mark.usefixtures("uncompiled")
+def test_a_considered_acceleration_goes_on_working():
+    """Nothing of it is in the first state; after dt it has added sigma [dt^2/2, dt]."""
+    model = pz.Model(["x", "v"], ["v", "b"], [pz.Sensor("place", ["x"])], [pz.Parameter("b", "considered")])
+    station, parameters = pz.Station("s", "place", 0.1), {"b": pz.Gaussian(0.2, 0.09)}
+    problem = pz.Problem(model, pz.Gaussian([0.0, 1.0], np.eye(2)), None, station, parameters)
+    estimate = pz.ExtendedKalmanFilter().estimate(problem, pz.Tracking([0.0], [0.1]))
+    forecast = estimate.predict([2.0, 5.0])
+    for dt, mean, P in zip((2.0, 5.0), forecast.mean, forecast.covariance, strict=True):
+        F, b = np.array([[1.0, dt], [0.0, 1.0]]), np.array([dt**2 / 2, dt])
+        assert_allclose(mean, F @ estimate.mean[-1] + 0.2 * b, rtol=1e-12)
+        assert_allclose(P, F @ estimate.covariance[-1] @ F.T + 0.09 * np.outer(b, b), rtol=1e-9)
+
+
 def test_it_prints_as_a_table(estimate):
     text = str(estimate.predict([5.0, 9.0]))
     assert len(text.splitlines()) == 3

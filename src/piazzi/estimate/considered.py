@@ -37,14 +37,14 @@ def with_considered(run: Run[_Estimator]) -> Run[_Estimator]:
         names = considered_names(problem)
         nominal = run(self, problem, tracking)
         for name in names if nominal.success else ():
-            sides = [run(self, _moved(problem, name, side * STEP), tracking) for side in (1.0, -1.0)]
+            sides = [run(self, moved(problem, name, side * STEP), tracking) for side in (1.0, -1.0)]
             nominal = _inflated(nominal, name, *sides)
         return nominal
 
     return estimate
 
 
-def _moved(problem: Problem, name: str, sigmas: float) -> Problem:
+def moved(problem: Problem, name: str, sigmas: float) -> Problem:
     """The problem with another value of a considered parameter."""
     given = problem.parameters[name]
     value = given.mean[0] + sigmas * np.sqrt(given.covariance[0, 0])

@@ -114,7 +114,8 @@ class Estimate:
         times : (P,) or one, s
             At or after the last epoch, not decreasing.  The way there is cut into equal parts no longer than the tracking's
             median interval, so that steps and process noise are those of the estimation; covariances are carried by the
-            transition matrices.  Between epochs, an estimate comes from a row of missing values (NaN) there.
+            transition matrices, and what considered parameters add goes on growing.  Between epochs, an estimate comes from a
+            row of missing values (NaN) there.
 
         Raises
         ------

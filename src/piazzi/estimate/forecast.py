@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi import kernels
+from piazzi.estimate.considered import STEP, considered_names, moved
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, numeric
 
@@ -61,19 +62,39 @@ class Forecast:
 
 def forecast(estimate: Estimate, times: Any) -> Forecast:
     """The estimate's last belief at later times; see `Estimate.predict`."""
-    problem, start, n = estimate.problem, float(estimate.times[-1]), estimate.problem.model.n
-    at = _checked(times, start)
-    last, P_last = np.ascontiguousarray(estimate.mean[-1]), np.ascontiguousarray(estimate.covariance[-1])
+    start = float(estimate.times[-1])
+    at, last, P_last = _checked(times, start), estimate.mean[-1], estimate.covariance[-1]
     if not (np.isfinite(last).all() and np.isfinite(P_last).all()):
         raise ValueError(f"nothing can be carried forward: {estimate.message}")
-    mean, P = np.empty((len(at), n)), np.empty((len(at), n, n))
-    kernels.load(problem.spec("transition", problem.noise_fragment, "forecast")).run_forecast(
-        len(at), at, start, *_parts(estimate, at), problem.given, problem.process_noise.covariance, last, P_last, mean, P
-    )
+    way = (at, start, *_parts(estimate, at))
+    considered = {name: estimate.details[f"considered_{name}"][-1] for name in considered_names(estimate.problem)}
+    own = P_last - sum((np.outer(s, s) for s in considered.values()), np.zeros_like(P_last))
+    mean, P = _carried(estimate.problem, way, last, own)
+    for name, s in considered.items():
+        above, below = (_carried(moved(estimate.problem, name, side), way, last + side * s, own)[0] for side in (STEP, -STEP))
+        s_then = (above - below) / (2 * STEP)
+        P += s_then[:, :, None] * s_then[:, None, :]
     before, after = _sigma(P_last[None]), _sigma(P)
     with np.errstate(divide="ignore", invalid="ignore"):
         growth = np.where((after == 0) & (before == 0), 1.0, after / before)
-    return Forecast(problem, start, at, mean, P, growth)
+    return Forecast(estimate.problem, start, at, mean, P, growth)
+
+
+def _carried(problem: Problem, way: tuple[Any, ...], x: Array, P: Array) -> tuple[Array, Array]:
+    """Means (P, n) and covariances (P, n, n) at the times of `way`."""
+    count, n = len(way[0]), problem.model.n
+    mean, covariance = np.empty((count, n)), np.empty((count, n, n))
+    kernels.load(problem.spec("transition", problem.noise_fragment, "forecast")).run_forecast(
+        count,
+        *way,
+        problem.given,
+        problem.process_noise.covariance,
+        np.ascontiguousarray(x),
+        np.ascontiguousarray(P),
+        mean,
+        covariance,
+    )
+    return mean, covariance
 
 
 def _sigma(covariance: Array) -> Array:
