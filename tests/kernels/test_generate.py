@@ -35,6 +35,27 @@ def test_sources_are_the_same_in_every_process():
     assert len(set(printed.pop().split())) == 8
 
 
+@pytest.mark.parametrize(
+    ("features", "lanes"),
+    [
+        ({"avx512f": True, "avx": True, "sse2": True}, 8),
+        ({"avx512f": False, "avx": True, "sse2": True}, 4),
+        ({"avx": False, "sse2": True}, 2),
+        ({"neon": True, "sve": False}, 2),
+        ({}, 1),
+    ],
+)
+def test_lanes_are_as_wide_as_the_machines_registers(features, lanes):
+    from piazzi.kernels.spec import lanes_with
+
+    assert lanes_with(features) == lanes
+
+
+def test_lanes_are_part_of_the_key_of_a_kernel():
+    problem = everything()
+    assert len({problem.spec("transition", "filter", lanes=lanes).digest() for lanes in (1, 2, 4, 8)}) == 4
+
+
 def everything() -> pz.Problem:
     """A model in whose rates and measurements every function of the language occurs."""
     one = [f"{name}(0.2 + x*x/9)" for name, arity in sorted(FUNCTIONS.items()) if arity == 1]

@@ -15,11 +15,12 @@ GUARD = -7.25e300  # stands around every result: nothing may be written beside i
 def call(function: Callable[..., None], *arrays: np.ndarray) -> None:
     """Compile `function` of pointers to doubles as the kernels' entries are, and call it."""
     from piazzi.kernels.compiled import Array, entry
-    from piazzi.kernels.library import POINTER, Entry
+    from piazzi.kernels.library import POINTER, load_objects
 
     function.__annotations__ = dict.fromkeys(function.__code__.co_varnames[: function.__code__.co_argcount], Array)
     compiled = entry(function)
-    Entry(compiled.address, (POINTER,) * len(arrays), compiled)(*arrays)
+    symbols = {"run": (compiled.native_name, (POINTER,) * len(arrays))}
+    load_objects({"run": compiled._library.object_code()}, symbols)["run"](*arrays)
 
 
 class Results:
@@ -178,6 +179,23 @@ def test_missing_numbers_stay_missing(n):
     call(through, given, out)
     assert np.isnan(out[:n]).all()
     assert_array_equal(out[n:], [1.0, 0.0])
+
+
+@pytest.mark.parametrize("n", [1, 3, 4, 9])
+def test_a_vector_may_keep_its_entries_apart(n):
+    """And computes the same so, also together with one that is in one piece; what is made alike is kept alike."""
+    from piazzi.kernels.compiled import alike, gathered, load_vector, scattered, store
+
+    entries = ", ".join(f"2.0 * y[{i}]" for i in range(n))
+    scope = {"alike": alike, "gathered": gathered, "load_vector": load_vector, "scattered": scattered, "store": store}
+    lines = ["def through(u, v, out):", f"    x, y = load_vector(u, 0, {n}), scattered(load_vector(v, 0, {n}))"]
+    lines += [f"    z = alike(y, {entries})", f"    w = alike(x, {entries})"]
+    lines += ["    for i in range(3):", "        z = z + 0.5 * x - y", "        w = w + 0.5 * x - gathered(y)"]
+    exec("\n".join([*lines, "    store(out, 0, gathered(z))", f"    store(out, {n}, w)"]), scope)
+    u, v, out = np.random.default_rng(n).standard_normal(n), np.random.default_rng(n + 1).standard_normal(n), np.zeros(2 * n)
+    call(scope["through"], u, v, out)
+    assert_allclose(out[:n], 1.5 * u - v, rtol=1e-14, atol=1e-15)
+    assert_allclose(out[n:], 1.5 * u - v, rtol=1e-14, atol=1e-15)
 
 
 # ---- several problems at once ----------------------------------------------------------------------------------------

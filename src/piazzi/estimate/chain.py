@@ -11,7 +11,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.inputs import Inputs
 from piazzi.kernels import Discrete, KernelSpec
-from piazzi.kernels.spec import machine_lanes
+from piazzi.kernels.spec import lanes_for
 from piazzi.model import Model, Sensor
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -64,7 +64,9 @@ class Chain:
 
     def __init__(self, problem: Problem, inputs: Inputs) -> None:
         self.problem, self.inputs = problem, inputs
-        self.library = kernels.load(problem.spec(*chain_fragments(problem, "graph_linearize"), lanes=machine_lanes()))
+        self.library = kernels.load(
+            problem.spec(*chain_fragments(problem, "graph_linearize"), lanes=lanes_for(problem.model.n))
+        )
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
         J = len(inputs.z)
         self.x, self.f, self.Phi = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N))

@@ -81,10 +81,9 @@ def _step(chain: Chain, solver: Solver, cost: float, damping: float, gated: bool
     """
     x, broken = chain.x.copy(), chain.broken.copy()
     while True:
-        price = np.abs(chain.multiplier)
         chain.x[:] = solver.moved(x, chain.dx)
         new = chain.linearize()
-        merit, merit_new = _merit(cost, price, broken), _merit(new, price, chain.broken)
+        merit, merit_new = _merit(cost, chain.multiplier, broken), _merit(new, chain.multiplier, chain.broken)
         if np.isfinite(merit_new) and (not gated or _lower(chain, merit_new, merit)):
             return True, new, 0.0 if damping <= FIRST_DAMPING else damping / 10.0
         damping = max(10.0 * damping, FIRST_DAMPING)
@@ -101,10 +100,12 @@ def _lower(chain: Chain, merit_new: float, merit: float) -> bool:
     return merit_new <= allowed or (merit_new <= allowed + 1e-3 * abs(merit) and merit_new <= allowed + chain.cost_rounding())
 
 
-def _merit(cost: float, price: Array, broken: Array) -> float:
+def _merit(cost: float, multiplier: Array, broken: Array) -> float:
     """The cost, and twice the price of the defects in directions without noise."""
+    if not broken.any():
+        return cost
     with np.errstate(all="ignore"):  # a step that is not finite has no merit
-        return cost + 2.0 * float((price * broken).sum())
+        return cost + 2.0 * float((np.abs(multiplier) * broken).sum())
 
 
 def _without_start(chain: Chain) -> Outcome:

@@ -11,7 +11,7 @@ from piazzi import kernels
 from piazzi.estimate.live import Clock, checked_measurement
 from piazzi.estimate.losses import Loss
 from piazzi.estimate.robust_window import row_space, window_fragments
-from piazzi.kernels.spec import machine_lanes
+from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
@@ -50,7 +50,7 @@ class LiveWindow:
         self._clock = Clock(problem)
         self._stations = {s.name: i for i, s in enumerate(problem.stations)}
         fragments = window_fragments(problem, loss, "window_live", "predict")
-        self._library = kernels.load(problem.spec(*fragments, lanes=machine_lanes()))
+        self._library = kernels.load(problem.spec(*fragments, lanes=lanes_for(problem.model.n)))
         n, m = problem.model.n, problem.model.width
         self.mean, self.covariance = problem.mean.copy(), problem.covariance.copy()
         self.refused: list[tuple[float, str]] = []

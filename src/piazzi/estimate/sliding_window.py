@@ -15,7 +15,7 @@ from piazzi.estimate.live_window import LiveWindow, window_opens
 from piazzi.estimate.losses import loss_of
 from piazzi.estimate.robust_window import row_space, row_weights, window_fragments
 from piazzi.estimate.stopwatch import Stopwatch
-from piazzi.kernels.spec import machine_lanes
+from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 
@@ -78,7 +78,7 @@ class SlidingWindow:
         """
         inputs = prepare(problem, tracking)
         begin = self.first_states(inputs.t)
-        library = kernels.load(problem.spec(*window_fragments(problem, self.loss, "window"), lanes=machine_lanes()))
+        library = kernels.load(problem.spec(*window_fragments(problem, self.loss, "window"), lanes=lanes_for(problem.model.n)))
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
         J = len(inputs.z)
         x, mean, P, P_delayed = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N)), np.empty((K, N, N))

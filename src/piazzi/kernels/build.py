@@ -35,7 +35,7 @@ def compile_entries(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes
     objects, symbols = {}, {}
     for name in names:
         callback: Any = getattr(module, name)
-        objects[name] = bytes(callback._library._get_compiled_object())
+        objects[name] = callback._library.object_code()
         symbols[name] = (callback.native_name, tuple(kinds.get(a, POINTER) for a in callback._sig.args))
     return objects, symbols
 

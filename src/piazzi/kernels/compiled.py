@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import acos, asin, atan, atan2, cos, cosh, exp, fabs, inf, isnan, log, nan, pi, pow, sin, sinh, sqrt, tan, tanh  # noqa: A004
+from math import cosh, fabs, inf, isnan, nan, pi, pow, sinh, sqrt, tanh  # noqa: A004
 from typing import Any
 
 from numba import cfunc, njit, types
 
+from piazzi.kernels.compiler import EntryPipeline
 from piazzi.kernels.lanes import (
+    alike,
     ceil,
+    gathered,
     heaviside,
     identity,
     load_lanes,
@@ -20,6 +23,7 @@ from piazzi.kernels.lanes import (
     maximum,
     minimum,
     outer,
+    scattered,
     sign,
     store,
     store_lanes,
@@ -27,10 +31,9 @@ from piazzi.kernels.lanes import (
     unit,
     vector,
 )
+from piazzi.kernels.lanes.elementary import HELPER, OPTIONS, acos, asin, atan, atan2, cos, exp, log, sin, tan
 from piazzi.kernels.plain import unless_missing as _unless_missing
 
-# "contract" lets a*b + c round once; nothing else of fast-math, so that NaN keeps meaning "missing"
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 Array = types.CPointer(types.float64)
 Indices = types.CPointer(types.int64)
 _SCALARS = {int: types.int64, float: types.float64}
@@ -38,18 +41,18 @@ _SCALARS = {int: types.int64, float: types.float64}
 
 def inline(function: Callable[..., Any]) -> Any:
     """Mark a helper that disappears into its caller."""
-    return njit(forceinline=True, **OPTIONS)(function)
+    return njit(forceinline=True, **HELPER)(function)
 
 
 def outlined(function: Callable[..., Any]) -> Any:
     """Mark a helper that is large and called from several places: it is compiled once and called."""
-    return njit(**OPTIONS)(function)
+    return njit(**HELPER)(function)
 
 
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls, with C's calling convention; its annotations are its types."""
     kinds = [k for name, k in function.__annotations__.items() if name != "return"]
-    return cfunc(types.void(*(_SCALARS.get(k, k) for k in kinds)), **OPTIONS)(function)
+    return cfunc(types.void(*(_SCALARS.get(k, k) for k in kinds)), pipeline_class=EntryPipeline, **OPTIONS)(function)
 
 
 unless_missing = inline(_unless_missing)

@@ -64,7 +64,7 @@ def _identity_source(model: Model) -> str:
     return (
         _inline("identity_rows()", f"return matrix({rows[0]})")
         + _inline("first_rows()", f"return matrix({rows[1]})")
-        + _inline("remember(x)", f"return vector({start})" if model.memory else "return x")
+        + _inline("remember(x)", f"return alike(x, {start})" if model.memory else "return x")
         + _inline("complete(R)", f"return {full}")
     )
 
@@ -113,7 +113,7 @@ def _dynamics_source(model: Model) -> str:
     nd, n = len(model.moving), model.n
     F = _Jacobian(d.F, "F")
     rates = [f"f{i}" for i in range(nd)]
-    whole = f"vector({', '.join(rates + ['0.0'] * (n - nd))})"
+    whole = f"alike(x, {', '.join(rates + ['0.0'] * (n - nd))})"
     rows = ", ".join(F.row_times(i, _rows(model), n) for i in range(nd))
     return (
         function("scalar_f", arguments, names, list(d.f))
@@ -131,10 +131,36 @@ def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
     if scheme[0] == "kepler":
         return kepler_source(model, *scheme[1:])
     if scheme[0] == "taylor":
-        nxt, h = constant_acceleration_step(model)
-    else:
-        nxt, h = tuple(derive(model).f), derive(model).dt
-    return _map_source(model, nxt, h)
+        return _taylor_source(model)
+    return _map_source(model, tuple(derive(model).f), derive(model).dt)
+
+
+def _taylor_source(model: Model) -> str:
+    """The step of the founding text; its derivative needs F of the rates alone, so it costs no more than they do."""
+    d, (nxt, h) = derive(model), constant_acceleration_step(model)
+    arguments, names, call = _arguments(model, ("h",))
+    names = {**names, h: "h"}
+    nd, n = len(model.moving), model.n
+    F, rows = _Jacobian(d.F, "F"), _rows(model)
+    moving = list(d.x[:nd])
+    rates = [moving.index(rate) if rate in moving else i for i, rate in enumerate(d.f)]  # the state whose rate counts
+    results = [f"n{i}" for i in range(nd)]
+    whole = f"alike(x, {', '.join(results + [f'x[{i}]' for i in range(nd, n)])})"
+    used = sorted(set(rates))
+    products = [f"K{j} = {F.row_times(j, rows, n)}" for j in used]
+    new = [f"R[{i}] + h*K{i}" if i == j else f"R[{i}] + h*R[{j}] + hh*K{j}" for i, j in enumerate(rates)]
+    return (
+        function("scalar_step", arguments, names, list(nxt))
+        + function("scalar_step_F", arguments, names, list(nxt) + F.outputs)
+        + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
+        + _inline(
+            "substep_jacobian(t, h, x, R, p)",
+            _unpack(results + F.names, f"scalar_step_F({call})"),
+            "hh = 0.5*h*h",
+            *products,
+            f"return {whole}, matrix({', '.join(new)})",
+        )
+    )
 
 
 def _map_source(model: Model, nxt: Sequence[sp.Expr], h: sp.Symbol) -> str:
@@ -146,7 +172,7 @@ def _map_source(model: Model, nxt: Sequence[sp.Expr], h: sp.Symbol) -> str:
     nd, n = len(model.moving), model.n
     G = _Jacobian(jacobian(sp.Matrix(list(nxt)), derive(model).x), "G")
     results = [f"n{i}" for i in range(nd)]
-    whole = f"vector({', '.join(results + [f'x[{i}]' for i in range(nd, n)])})"
+    whole = f"alike(x, {', '.join(results + [f'x[{i}]' for i in range(nd, n)])})"
     rows = ", ".join(G.row_times(i, _rows(model), n) for i in range(nd))
     return (
         function("scalar_step", arguments, names, list(nxt))

@@ -23,11 +23,11 @@ class Entry:
         self._keep = keep  # the code lives as long as something can call it
 
     def __call__(self, *args: Any) -> None:
-        self._call(*[_address(a) if isinstance(a, np.ndarray) else a for a in args])
+        self._call(*_addresses(args))
 
     def bind(self, *args: Any) -> Callable[[], None]:
         """The call with these arguments, for repeating: arrays are looked up once, and read and written where they are."""
-        ready = [_address(a) if isinstance(a, np.ndarray) else a for a in args]
+        ready = _addresses(args)
 
         def again(call: Any = self._call, keep: Any = (args, self._keep)) -> None:
             call(*ready)
@@ -35,12 +35,13 @@ class Entry:
         return again
 
 
-_FLOAT, _INDEX = np.dtype(np.float64), np.dtype(np.int64)
+_ARRAY, _FLOAT, _INDEX = np.ndarray, np.dtype(np.float64), np.dtype(np.int64)
 _HEADER: int = object.__basicsize__
+_read = ctypes.c_void_p.from_address
 
 
 def _field_after_header(a: np.ndarray[Any, Any]) -> int | None:
-    return ctypes.c_void_p.from_address(id(a) + _HEADER).value
+    return _read(id(a) + _HEADER).value
 
 
 def _attribute(a: np.ndarray[Any, Any]) -> int | None:
@@ -53,11 +54,18 @@ _probe = np.zeros(1)
 _data_pointer = _field_after_header if _field_after_header(_probe) == _attribute(_probe) else _attribute
 
 
-def _address(a: np.ndarray[Any, Any]) -> int | None:
-    kind = a.dtype
-    if not a.flags.c_contiguous or (kind is not _FLOAT and kind is not _INDEX and kind not in (_FLOAT, _INDEX)):
-        raise TypeError(f"a kernel needs contiguous float64 or int64, not {kind} with strides {a.strides}")
-    return _data_pointer(a)
+def _addresses(args: tuple[Any, ...]) -> list[Any]:
+    """The arguments with arrays replaced by the addresses of their numbers; one loop, because it runs at every call."""
+    out = []
+    for a in args:
+        if type(a) is _ARRAY or isinstance(a, _ARRAY):
+            kind = a.dtype
+            if not a.flags.c_contiguous or (kind is not _FLOAT and kind is not _INDEX and kind not in (_FLOAT, _INDEX)):
+                raise TypeError(f"a kernel needs contiguous float64 or int64, not {kind} with strides {a.strides}")
+            out.append(_data_pointer(a))
+        else:
+            out.append(a)
+    return out
 
 
 class PlainEntry:

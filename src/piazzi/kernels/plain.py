@@ -40,6 +40,21 @@ def vector(*entries: float) -> Array:
     return np.array(entries, dtype=float)
 
 
+def alike(x: Array, *entries: float) -> Array:
+    """The vector of these entries, kept as `x` is."""
+    return np.array(entries, dtype=float)
+
+
+def scattered(x: Array) -> Array:
+    """The same vector, its entries apart."""
+    return x
+
+
+def gathered(x: Array) -> Array:
+    """The same vector in one piece."""
+    return x
+
+
 def matrix(*rows: Array) -> Array:
     """The matrix of these rows."""
     return np.array(rows, dtype=float)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from piazzi.problem.problem import Problem
 
 
-def composed(problem: Problem, fragments: tuple[str, ...]) -> tuple[str, ...]:
+def composed(problem: Problem, fragments: tuple[str, ...], lanes: int) -> tuple[str, ...]:
     """The fragments by the names of their files, in order.
 
     "transition" becomes the motion of the integrator and the events on the way; "noise_scaled" and "noise_integral" become the
@@ -22,7 +22,7 @@ def composed(problem: Problem, fragments: tuple[str, ...]) -> tuple[str, ...]:
     events = "_manoeuvres" if problem.manoeuvres else ""
     axes = "axes_orbit" if problem.process_noise.axes == "orbit" else "axes"
     integral = "noise_adaptive" if isinstance(integrator, DormandPrince) else "noise_integral"
-    together = integrator.in_lanes and not events
+    together = integrator.in_lanes and not events and lanes > 1
     linearize = "linearize_integral" if problem.noise_varies else "linearize_scaled" if together else "linearize_each"
     parts = {
         "transition": ("matrices", *integrator.fragments, f"transition{events}"),

@@ -233,7 +233,16 @@ class Problem:
     def spec(self, *fragments: str, lanes: int = 1) -> KernelSpec:
         """The compiled module with these fragments, for this model, integrator, kind of noise, and manoeuvres or none."""
         assert self.integrator is not None
-        return KernelSpec(self.model, self.integrator.scheme, composed(self, fragments), lanes)
+        spec = self._specs.get((fragments, lanes))
+        if spec is None:
+            spec = self._specs[fragments, lanes] = KernelSpec(
+                self.model, self.integrator.scheme, composed(self, fragments, lanes), lanes
+            )
+        return spec
+
+    @cached_property
+    def _specs(self) -> dict[tuple[tuple[str, ...], int], KernelSpec]:
+        return {}
 
     @property
     def noise_fragment(self) -> str:

@@ -4,6 +4,8 @@ import piazzi.kernels.lanes.operators  # noqa: F401  (registers + - * @ with Num
 from piazzi.kernels.lanes.functions import ceil, heaviside, maximum, minimum, sign
 from piazzi.kernels.lanes.kinds import Matrix, Pack, Vector, element
 from piazzi.kernels.lanes.memory import (
+    alike,
+    gathered,
     identity,
     load_lanes,
     load_matrix,
@@ -11,6 +13,7 @@ from piazzi.kernels.lanes.memory import (
     load_vector,
     matrix,
     outer,
+    scattered,
     store,
     store_lanes,
     store_packs,
@@ -22,8 +25,10 @@ __all__ = [
     "Matrix",
     "Pack",
     "Vector",
+    "alike",
     "ceil",
     "element",
+    "gathered",
     "heaviside",
     "identity",
     "load_lanes",
@@ -34,6 +39,7 @@ __all__ = [
     "maximum",
     "minimum",
     "outer",
+    "scattered",
     "sign",
     "store",
     "store_lanes",

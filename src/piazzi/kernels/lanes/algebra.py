@@ -7,6 +7,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba.core import types
+from numba.core.cgutils import alloca_once, for_range
 
 from piazzi.kernels.lanes.kinds import DOUBLE, FUSE, INDEX, Matrix, Pack, Vector, element, llvm_type
 
@@ -91,8 +92,74 @@ def combine(b: Any, coefficients: Sequence[Any], rows: Sequence[Any]) -> Any:
     return total
 
 
+def total(b: Any, v: Any) -> Any:
+    """The sum of a register's entries, by halves."""
+    n, undefined = v.type.count, ir.Constant(v.type, ir.Undefined)
+    if n == 1:
+        return get(b, v, 0)
+    half = n // 2
+    low, high = (
+        b.shuffle_vector(v, undefined, ir.Constant(ir.VectorType(INDEX, half), list(range(start, start + half))))
+        for start in (0, half)
+    )
+    both = total(b, b.fadd(low, high, flags=FUSE))
+    return b.fadd(both, get(b, v, n - 1), flags=FUSE) if n % 2 else both
+
+
+# rows beyond which products and transposes are loops over memory: registers do not hold them, and straight code is long
+LOOPED = 8
+
+
+class Table:
+    """A matrix in memory, row by row without gaps, for loops over its rows."""
+
+    def __init__(self, b: Any, ty: Matrix) -> None:
+        self.b, self.ty = b, ty
+        self.place = alloca_once(b, ir.ArrayType(ir.ArrayType(DOUBLE, ty.n), ty.r))
+
+    def entry(self, i: Any, j: int) -> Any:
+        """Pointer to an entry."""
+        return self.b.gep(self.place, [ir.Constant(INDEX, 0), i, ir.Constant(INDEX, j)])
+
+    def put(self, i: Any, row: Any) -> None:
+        self.b.store(row, self.b.bitcast(self.entry(i, 0), row.type.as_pointer())).align = 8
+
+    def fill(self, value: Any) -> Table:
+        for i, row in enumerate(parts(self.b, value)):
+            self.put(ir.Constant(INDEX, i), row)
+        return self
+
+    def value(self) -> Any:
+        """The matrix."""
+        row = llvm_type(self.ty.row).as_pointer()
+        rows = [self.b.load(self.b.bitcast(self.entry(ir.Constant(INDEX, i), 0), row)) for i in range(self.ty.r)]
+        for r in rows:
+            r.align = 8
+        return join(self.b, self.ty, rows)
+
+
+def looped_product(b: Any, left: Matrix, a: Any, result: Matrix, c: Any) -> Any:
+    """A C, one row of A after the other."""
+    A, out, rows = Table(b, left).fill(a), Table(b, result), parts(b, c)
+    with for_range(b, ir.Constant(INDEX, left.r)) as loop:
+        out.put(loop.index, combine(b, [b.load(A.entry(loop.index, j)) for j in range(left.n)], rows))
+    return out.value()
+
+
+def looped_transpose(b: Any, ty: Matrix, a: Any) -> Any:
+    """A^T, one column of A after the other."""
+    A, out, row = Table(b, ty).fill(a), Table(b, Matrix(ty.n, ty.r)), Vector(ty.r)
+    with for_range(b, ir.Constant(INDEX, ty.n)) as loop:
+        zero = ir.Constant(INDEX, 0)
+        places = [b.gep(A.place, [zero, ir.Constant(INDEX, i), loop.index]) for i in range(ty.r)]
+        out.put(loop.index, join(b, row, [b.load(place) for place in places]))
+    return out.value()
+
+
 def transpose(b: Any, ty: Matrix, a: Any) -> Any:
     """A^T."""
+    if ty.w == 1 and min(ty.r, ty.n) > LOOPED:
+        return looped_transpose(b, ty, a)
     rows = [parts(b, row) for row in parts(b, a)] if ty.w > 1 or max(ty.r, ty.n) > 8 else None
     target = Matrix(ty.n, ty.r, ty.w)
     if rows is not None:

@@ -56,22 +56,9 @@ def _register_function(function: Any, lower: Callable[..., Any], arguments: int)
 
 _register_function(math.sqrt, _vector_instruction("sqrt"), 1)
 _register_function(math.fabs, _vector_instruction("fabs"), 1)
-for _function in (
-    math.sin,
-    math.cos,
-    math.tan,
-    math.asin,
-    math.acos,
-    math.atan,
-    math.sinh,
-    math.cosh,
-    math.tanh,
-    math.exp,
-    math.log,
-):
+for _function in (math.sinh, math.cosh, math.tanh):
     _register_function(_function, _lane_by_lane(_function), 1)
-for _of_two in (math.atan2, math.pow):
-    _register_function(_of_two, _lane_by_lane(_of_two), 2)
+_register_function(math.pow, _lane_by_lane(math.pow), 2)
 
 
 def _select(b: Any, x: Any, relation: str, y: Any, yes: Any, no: Any) -> Any:

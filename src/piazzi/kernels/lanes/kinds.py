@@ -36,11 +36,11 @@ class Pack(types.Type):
 
 
 class Vector(types.Type):
-    """`n` elements of `w` lanes."""
+    """`n` elements of `w` lanes; `apart`, each has a register of its own even where there is one lane."""
 
-    def __init__(self, n: int, w: int = 1) -> None:
-        self.n, self.w = n, w
-        super().__init__(f"vector{n}x{w}")
+    def __init__(self, n: int, w: int = 1, apart: bool = False) -> None:
+        self.n, self.w, self.apart = n, w, apart and w == 1
+        super().__init__(f"vector{n}x{w}{'apart' if self.apart else ''}")
 
 
 class Matrix(types.Type):
@@ -61,7 +61,8 @@ def llvm_type(ty: types.Type) -> ir.Type:
     if isinstance(ty, Pack):
         return ir.VectorType(DOUBLE, ty.w)
     if isinstance(ty, Vector):
-        return ir.VectorType(DOUBLE, ty.n) if ty.w == 1 else ir.ArrayType(ir.VectorType(DOUBLE, ty.w), ty.n)
+        whole = ty.w == 1 and not ty.apart
+        return ir.VectorType(DOUBLE, ty.n) if whole else ir.ArrayType(llvm_type(element(ty.w)), ty.n)
     if isinstance(ty, Matrix):
         return ir.ArrayType(llvm_type(ty.row), ty.r)
     return DOUBLE
@@ -86,7 +87,7 @@ def lanes_of(ty: types.Type) -> int:
 def wider(ty: types.Type, w: int) -> types.Type:
     """The same shape in `w` lanes."""
     if isinstance(ty, Vector):
-        return Vector(ty.n, w)
+        return Vector(ty.n, w, ty.apart)
     return Matrix(ty.r, ty.n, w) if isinstance(ty, Matrix) else element(w)
 
 

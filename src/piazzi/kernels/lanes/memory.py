@@ -9,7 +9,16 @@ from numba.core import types
 from numba.extending import intrinsic
 
 from piazzi.kernels.lanes.algebra import get, join, parts, scale, widen
-from piazzi.kernels.lanes.kinds import DOUBLE, Matrix, Vector, element, llvm_type, wider
+from piazzi.kernels.lanes.kinds import DOUBLE, Matrix, Vector, element, lanes_of, llvm_type, wider
+
+
+def _elements(context: Any, b: Any, kinds: Any, want: Any, given: Any) -> list[Any]:
+    """The entries of a tuple of numbers and packs, in the lanes of `want`."""
+    values = [get(b, given, i) for i in range(len(kinds))]
+    values = [
+        context.cast(b, v, k, types.float64) if isinstance(k, types.Number) else v for v, k in zip(values, kinds, strict=True)
+    ]
+    return [widen(b, k, want, v) for v, k in zip(values, kinds, strict=True)]
 
 
 @intrinsic
@@ -20,14 +29,36 @@ def vector(typing: Any, *entries: Any) -> Any:
     result, want = Vector(len(kinds), w), element(w)
 
     def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
-        values = [get(b, args[0], i) for i in range(len(kinds))]
-        values = [
-            context.cast(b, v, k, types.float64) if isinstance(k, types.Number) else v
-            for v, k in zip(values, kinds, strict=True)
-        ]
-        return join(b, result, [widen(b, k, want, v) for v, k in zip(values, kinds, strict=True)])
+        return join(b, result, _elements(context, b, kinds, want, args[0]))
 
     return result(types.StarArgTuple(kinds)), lower
+
+
+@intrinsic
+def alike(typing: Any, x: Any, *entries: Any) -> Any:
+    """The vector of these entries, kept in registers as `x` is."""
+    kinds: Any = entries[0] if len(entries) == 1 and isinstance(entries[0], types.BaseTuple) else entries
+    w = max(lanes_of(kind) for kind in (x, *kinds))
+    result, want = Vector(len(kinds), w, x.apart), element(w)
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        return join(b, result, _elements(context, b, kinds, want, args[1]))
+
+    return result(x, types.StarArgTuple(kinds)), lower
+
+
+@intrinsic
+def scattered(typing: Any, x: Any) -> Any:
+    """The same vector with every entry in a register of its own: for what is computed entry by entry, in a loop."""
+    result = Vector(x.n, x.w, apart=True)
+    return result(x), lambda context, b, sig, args: join(b, result, parts(b, args[0]))
+
+
+@intrinsic
+def gathered(typing: Any, x: Any) -> Any:
+    """The same vector in one register."""
+    result = Vector(x.n, x.w)
+    return result(x), lambda context, b, sig, args: join(b, result, parts(b, args[0]))
 
 
 @intrinsic

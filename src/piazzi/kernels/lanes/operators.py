@@ -6,11 +6,24 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
+from llvmlite import ir
 from numba.core import types
 from numba.core.imputils import lower_builtin, lower_getattr
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer, infer_getattr, infer_global, signature
 
-from piazzi.kernels.lanes.algebra import combine, get, join, parts, scale, transpose, widen, zipped
+from piazzi.kernels.lanes.algebra import (
+    LOOPED,
+    combine,
+    get,
+    join,
+    looped_product,
+    parts,
+    scale,
+    total,
+    transpose,
+    widen,
+    zipped,
+)
 from piazzi.kernels.lanes.kinds import FUSE, Matrix, Pack, Vector, element, is_element, lanes_of, wider
 
 
@@ -20,6 +33,7 @@ def _shape(ty: types.Type) -> tuple[int, ...]:
 
 def _same(a: types.Type, c: types.Type) -> types.Type | None:
     """Type of a sum: equal shapes, in the lanes of the wider one."""
+    a = c if getattr(c, "apart", False) else a
     return wider(a, max(lanes_of(a), lanes_of(c))) if _shape(a) == _shape(c) else None
 
 
@@ -59,16 +73,20 @@ def _lower_matmul(b: Any, sig: Any, x: Any, y: Any) -> Any:
     a, c = sig.args
     if isinstance(a, Matrix) and isinstance(c, Matrix):
         x, y = widen(b, a, wider(a, sig.return_type.w), x), widen(b, c, wider(c, sig.return_type.w), y)
+        if sig.return_type.r > LOOPED and sig.return_type.w == 1:
+            return looped_product(b, a, x, sig.return_type, y)
         rows = parts(b, y)
         return join(b, sig.return_type, [combine(b, parts(b, row), rows) for row in parts(b, x)])
     if isinstance(a, Matrix):  # A v is a combination of the columns of A
         return combine(b, parts(b, y), parts(b, transpose(b, a, x)))
     if isinstance(c, Matrix):
         return combine(b, parts(b, x), parts(b, y))
-    total = b.fmul(get(b, x, 0), get(b, y, 0), flags=FUSE)
+    if isinstance(x.type, ir.VectorType):
+        return total(b, b.fmul(x, y, flags=FUSE))
+    sum_ = b.fmul(get(b, x, 0), get(b, y, 0), flags=FUSE)
     for i in range(1, a.n):
-        total = b.fadd(total, b.fmul(get(b, x, i), get(b, y, i), flags=FUSE), flags=FUSE)
-    return total
+        sum_ = b.fadd(sum_, b.fmul(get(b, x, i), get(b, y, i), flags=FUSE), flags=FUSE)
+    return sum_
 
 
 def _lower_plain(name: str) -> Callable[..., Any]:
