@@ -172,3 +172,19 @@ def test_the_robust_graph_is_as_good_as_the_clean_one_over_fifty_seeds():
     for loss in LOSSES:
         assert median[loss.name] <= 1.2 * median["clean"], median
     assert median["plain"] > 10 * median["clean"]
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_tukeys_window_comes_back_from_a_wrong_prior():
+    """Fifteen sigma off, every row looks like an outlier; taken at its word, Tukey's loss would never look at one again."""
+    problem = satellite(pz.Taylor(3))
+    tracking = pz.simulate(problem, np.arange(40) * 15.0, np.random.default_rng(2))
+    away = tracking.truth[0] + [1.5e6, 0.0, 0.0, 0.0]
+    wrong = satellite(pz.Taylor(3), prior=pz.Gaussian.from_sigma(away, [1e5, 3e6, 800.0, 800.0]))
+    loss = pz.Tukey()
+    estimate = pz.SlidingWindow(lag=10, loss=loss).estimate(wrong, tracking)
+    x, y = estimate.mean[-10:, 0], estimate.mean[-10:, 1]
+    residual = (tracking.values[-10:, 0] - np.arctan2(y, x)) / np.sqrt(problem.station_noise[0, 0, 0])
+    assert np.abs(residual).mean() < loss.k
+    assert estimate.details["weights"][0] < 0.01
+    assert estimate.details["weights"][-10:].mean() > 0.5

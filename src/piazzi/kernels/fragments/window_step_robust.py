@@ -1,6 +1,7 @@
 """Sliding window with a loss: `settle` of `window_step`, with each row weighted by its residual at the current states.
 
 When an epoch arrives its states are only predicted, so its rows are weighted by their innovation in units of its own spread.
+Where Tukey's loss has disowned most of the window, Cauchy's with the same constant leads back.
 """
 
 from piazzi.kernels.fragments.chain import follow_epoch
@@ -17,6 +18,15 @@ def weigh_new_rows(k, base, t, x, first_row, z, station, sensor, numbers, R, cor
         squared, present = surprise(row, innovation, spread, work)
         whiten_row(row, out, k, t, state, z, station, sensor, numbers, R, correlated, p, nu, H, work)
         weigh_row(row, out, squared, present, nu, H, work)
+
+
+@inline
+def disowned(first, last, work):
+    """Whether most of the rows first ... last - 1 have hardly any weight: Tukey's loss would never take them back."""
+    total = 0.0
+    for row in range(first, last):
+        total += work[M * (M + N) + 2 + M + row]
+    return total < 0.5 * (last - first)
 
 
 @inline
@@ -64,6 +74,10 @@ def settle(
     for iteration in range(iterations):
         linearize_dynamics(a, W, t, count, scale, p, Q, x, f, Phi, Q_all)
         linearize_rows(a, W, t, x, first_row, z, station, sensor, numbers, R, correlated, p, nu, H, work)
+        kind = work[M * (M + N)]
+        if kind == 3.0 and disowned(first_row[a], first_row[k], work):
+            work[M * (M + N)] = 2.0
+            linearize_rows(a, W, t, x, first_row, z, station, sensor, numbers, R, correlated, p, nu, H, work)
         d = m - load_vector(x, a * N, N)
         P_new = P
         P_old = P
@@ -118,6 +132,7 @@ def settle(
                 )
             first = (first_row[a + j] - base) * M
             d, P_new, P_old, C = follow_epoch(first, (first_row[a + j + 1] - base) * M, d, P_new, P_old, C, nu, H)
+        work[M * (M + N)] = kind
         backward(a, W, first_row, Phi, nu, H, 0.0, tether, d_pred, P_pred, gains, multiplier, dx)
         for j in range(W):
             store(x, (a + j) * N, load_vector(x, (a + j) * N, N) + load_vector(dx, j * N, N))
