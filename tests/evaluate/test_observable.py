@@ -157,6 +157,24 @@ def test_range_only_has_its_mirror_image_for_a_twin(angle):
     assert_allclose(twin.prior_distance, np.linalg.norm(mirrored - first - 0.1), rtol=1e-4)
 
 
+def test_a_continuum_of_solutions_is_no_row_of_twins():
+    """Ranges from the planet's own centre: every orbit turned about it gives the same ones."""
+    centre = pz.Station("centre", "range", 0.01, {"mx": 0.0, "my": 0.0})
+    first = [11.0, 1.0, 0.5, 10.0]
+    problem = replace(range_only()[0], stations=[centre], prior=pz.Gaussian(first, np.eye(4)), truth=pz.Truth(state=first))
+    found = pz.observability(problem, drawn(problem, 40, 0.2))
+    turned = np.array([-1.0, 11.0, -10.0, 0.5])  # the derivative of a turn is what no range sees
+    assert (found.singular_values == 0).tolist() == [False, False, False, True]
+    assert_allclose(abs(found.information.directions[-1] @ turned), np.linalg.norm(turned), rtol=1e-9)
+    assert np.isinf(found.crlb_sigma).all()
+    assert len(found.twins) > 8
+    for twin in found.twins:
+        assert np.hypot(*twin.state[:2]) == pytest.approx(np.hypot(*first[:2]), rel=1e-5)
+        assert np.hypot(*twin.state[2:]) == pytest.approx(np.hypot(*first[2:]), rel=1e-5)
+    assert "a continuum of first states" in found.verdict
+    assert len(found.verdict) < 600
+
+
 def test_bearings_have_no_twin():
     problem = satellite()
     assert pz.observability(problem, drawn(problem, 300, 15.0)).twins == ()
@@ -247,6 +265,23 @@ def test_one_epoch_and_missing_values():
     assert (a.singular_values < pz.observability(problem, tracking, twins=False).singular_values).all()
     assert a.growth_values[0].max() == 0
     assert len(every_other.times) == 50
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120, 200])
+def test_no_width_is_exceeded(width):
+    from rich.console import Console
+
+    problem, tracking = range_only()
+    shown = [pz.observability(problem, tracking), pz.windows(problem, tracking, [1, 20], graph=False)]
+    console = Console(width=width, color_system=None)
+    with console.capture() as captured:
+        for value in shown:
+            console.print(value)
+    text = captured.get()
+    assert max(map(len, text.splitlines())) <= width
+    assert "\u2026" not in text  # nothing is cut
+    assert f"{shown[0].crlb_sigma[1]:.5f}" in text
+    assert f"{shown[1].rmse('position')[1]:.4f}" in text
 
 
 def test_it_shows_itself():

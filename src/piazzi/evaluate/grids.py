@@ -5,41 +5,81 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from piazzi.evaluate.quantities import printable
+from piazzi.evaluate.quantities import NOTHING, printable
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions
 
 
 @dataclass(frozen=True)
 class Grid:
-    """A table of text: a title, a heading for every column (lines apart by a newline), rows; `left` columns hold words."""
+    """A table of text.
+
+    Attributes
+    ----------
+    title : str
+    heads : heading of each column, lines apart by a newline
+    rows : tuples of as many texts
+    left : how many columns, from the left, hold words
+    spare : columns to leave out, in this order, where the table is too wide
+    """
 
     title: str
     heads: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     left: int = 1
+    spare: tuple[int, ...] = ()
+
+    def without(self, columns: Sequence[int]) -> Grid:
+        """The table without these columns."""
+        kept = [i for i in range(len(self.heads)) if i not in columns]
+        rows = tuple(tuple(row[i] for i in kept) for row in self.rows)
+        left = sum(i < self.left for i in kept)
+        return Grid(self.title, tuple(self.heads[i] for i in kept), rows, left)
 
 
-def as_rich(grid: Grid) -> Iterable[Any]:
-    """The title and a table for rich."""
+def as_rich(grid: Grid, console: Console, options: ConsoleOptions) -> Iterable[Any]:
+    """The title and a table for rich, without spare columns where it would be too wide; then each row as a block of lines."""
+    from rich.measure import Measurement
+    from rich.text import Text
+
+    if grid.title:
+        yield Text(printable(grid.title), style="bold")
+    for count in range(len(grid.spare) + 1):
+        table = _table(grid.without(grid.spare[:count]))
+        if Measurement.get(console, options.update(max_width=10_000), table).maximum <= options.max_width:
+            yield table
+            break
+    else:
+        yield from _blocks(grid)
+    yield Text("")
+
+
+def _table(grid: Grid) -> Any:
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=box.SIMPLE_HEAD, header_style="bold", show_edge=False, padding=(0, 1, 0, 0))
     for i, head in enumerate(grid.heads):
-        table.add_column(
-            Text("\n".join(map(printable, head.split("\n")))),
-            justify="left" if i < grid.left else "right",
-            no_wrap=True,
-            vertical="bottom",
-        )
+        lines = Text("\n".join(map(printable, head.split("\n"))))
+        table.add_column(lines, justify="left" if i < grid.left else "right", no_wrap=True, vertical="bottom")
     for row in grid.rows:
         table.add_row(*(Text(printable(cell)) for cell in row))
-    if grid.title:
-        yield Text(printable(grid.title), style="bold")
-    yield table
-    yield Text("")
+    return table
+
+
+def _blocks(grid: Grid) -> Iterable[Any]:
+    """Every row as its first text and lines of heading and value."""
+    from rich.text import Text
+
+    for row in grid.rows:
+        yield Text(printable(f"{grid.heads[0]} {row[0]}".replace("\n", " ").strip()))
+        for head, cell in list(zip(grid.heads, row, strict=True))[1:]:
+            if cell not in ("", NOTHING):
+                yield Text(printable(f"  {head}: {cell}".replace("\n", " ")))
 
 
 def as_html(grids: Sequence[Grid], sentences: Sequence[str]) -> str:

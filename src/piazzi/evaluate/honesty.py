@@ -13,7 +13,7 @@ from piazzi.evaluate.consistency import Check, bias_check, nees_check, nis_check
 from piazzi.evaluate.metrics import Consistency, used
 from piazzi.problem.checks import Array
 
-LONGEST = 300_000  # epochs from which the memory of these tests would exceed that of the estimators
+LONGEST = 300_000  # epochs from which NEES is not tested: it would take more memory than the estimators do
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,12 @@ class Honesty:
 
 def judged(estimate: Estimate, consistency: Consistency | None) -> Honesty:
     """The tests of an estimate, whose NEES (K,) come in `consistency`; None without truth."""
-    if not estimate.success or len(estimate.mean) > LONGEST:
+    long, one_row = len(estimate.mean) > LONGEST, int(np.diff(estimate.tracking.first_row).max()) == 1
+    if not estimate.success or (long and not one_row):
         return Honesty()
     with np.errstate(all="ignore"):
-        found = linearized(estimate.problem, estimate.tracking, estimate.mean)
-        R = None if consistency is None else error_correlation(estimate, found)
+        found = None if long else linearized(estimate.problem, estimate.tracking, estimate.mean)
+        R = None if consistency is None or found is None else error_correlation(estimate, found)
         w = own_innovations(estimate, found)
     series, rows = _series(estimate, w), int((~np.isnan(w)).any(axis=1).sum())
     whole, half = _nees(consistency, R, 0), _nees(consistency, R, len(estimate.mean) // 2)
@@ -115,14 +116,15 @@ def _at_most_one(R: Array) -> Array:
     return np.asarray(R / largest[:, None, None])
 
 
-def own_innovations(estimate: Estimate, found: Linearized) -> Array:
+def own_innovations(estimate: Estimate, found: Linearized | None) -> Array:
     """Standardised innovations (J, m) of an estimate, NaN where missing or rejected: white, of unit variance, and independent.
 
-    Rows of one epoch were predicted from the same state, so they are whitened against each other.
+    Rows of one epoch were predicted from the same state, so they are whitened against each other; where there are any, `found`
+    is needed.
     """
     inputs = prepare(estimate.problem, estimate.tracking)
     nu = np.where(used(estimate), estimate.innovations, np.nan)
-    if int(np.diff(inputs.first_row).max()) == 1:
+    if found is None or int(np.diff(inputs.first_row).max()) == 1:
         return standardized(nu, estimate.innovation_covariances)
     if estimate.view == "delayed":
         return np.where(np.isnan(nu), np.nan, found.whitened)

@@ -155,7 +155,7 @@ class Observability:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         from piazzi.evaluate.observable_display import render
 
-        return render(self)
+        return render(self, console, options)
 
     def __str__(self) -> str:
         return as_text(self)

@@ -11,9 +11,12 @@ from piazzi.evaluate.grids import Grid, as_html, as_rich
 from piazzi.evaluate.quantities import display_of, number
 
 if TYPE_CHECKING:
-    from rich.console import RenderResult
+    from rich.console import Console, ConsoleOptions, RenderResult
 
     from piazzi.evaluate.observable import Observability
+
+
+_LISTED = 8  # twins in the table
 
 
 def grids(found: Observability) -> list[Grid]:
@@ -36,12 +39,12 @@ def html(found: Observability) -> str:
     return as_html(grids(found), sentences(found))
 
 
-def render(found: Observability) -> RenderResult:
+def render(found: Observability, console: Console, options: ConsoleOptions) -> RenderResult:
     """Tables and verdict for rich."""
     from rich.text import Text
 
     for grid in grids(found):
-        yield from as_rich(grid)
+        yield from as_rich(grid, console, options)
     for line in sentences(found):
         yield Text(line)
 
@@ -84,7 +87,7 @@ def _direction(value: float, direction: np.ndarray[tuple[int], np.dtype[np.float
 def _twins(found: Observability) -> Grid:
     names = found.problem.model.names
     rows = []
-    for i, twin in enumerate(found.twins):
+    for i, twin in enumerate(found.twins[:_LISTED]):
         distance = "-" if twin.prior_distance is None else number(twin.prior_distance, 3)
         rows.append((str(i + 1), number(twin.misfit, 2), distance, *(number(float(v), 5) for v in twin.state)))
     heads = ("twin", "misfit\n[sigma]", "from prior\n[sigma]", *names)

@@ -19,6 +19,7 @@ _FEEBLE = 1.0  # singular value up to which the measurements tell less than the 
 _LUCK = 0.999  # share of matched runs, of errors that never change their direction, that stay within what counts as attained
 _CLEARLY = 1.5  # times the other's errors that are worth a verdict
 _FAR = 5.0  # prior sigmas from which a twin is ruled out
+_LISTED = 4  # twins that are told one by one
 _ALIKE = 3.0  # difference of all measurements together, in sigma, that noise hides
 
 
@@ -40,7 +41,9 @@ def _local(found: Observability) -> list[str]:
     if blind:
         unseen = [name for name, s in zip(model.names, found.crlb_sigma.tolist(), strict=True) if not np.isfinite(s)]
         many = f"{blind} of {model.n} directions of the first state {'is' if blind == 1 else 'are'} not observable"
-        return [f"Observability: {many}: no measurement depends on {direction}, so nothing is known of {', '.join(unseen)}."]
+        return [
+            f"Observability: {many}: a step along {direction} changes no measurement, so {', '.join(unseen)} have no bound."
+        ]
     sigmas = []
     for name, s in zip(model.names, found.crlb_sigma.tolist(), strict=True):
         show = display_of(model.unit(name), [s])
@@ -60,9 +63,11 @@ def _local(found: Observability) -> list[str]:
 def _twins(found: Observability) -> list[str]:
     if not found.twins:
         return ["Twins: none found."]
+    if (found.singular_values == 0).any():
+        return [f"Twins: a continuum of first states gives the same measurements; {len(found.twins)} of them were found."]
     out = []
     count = int((~np.isnan(found.tracking.values)).sum())
-    for twin in found.twins:
+    for twin in found.twins[:_LISTED]:
         state = ", ".join(f"{name} {number(v, 4)}" for name, v in zip(found.problem.model.names, twin.state, strict=True))
         exact = twin.misfit < 1e-6
         hidden = twin.misfit * count**0.5 <= _ALIKE
@@ -71,6 +76,8 @@ def _twins(found: Observability) -> list[str]:
         )  # fmt: skip
         place = "" if twin.prior_distance is None else f", {number(twin.prior_distance, 3)} sigma from the prior mean"
         out.append(f"Twin: {state} gives {what}{place}.")
+    if len(found.twins) > _LISTED:
+        out.append(f"And {len(found.twins) - _LISTED} more twins.")
     far = [twin.prior_distance is not None and twin.prior_distance > _FAR for twin in found.twins]
     if all(far):
         out.append("Only the prior tells the truth from a twin, and it does so clearly.")

@@ -148,7 +148,7 @@ class WindowTrade:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         from piazzi.evaluate.window_trade_display import render
 
-        return render(self)
+        return render(self, console, options)
 
     def _repr_html_(self) -> str:
         from piazzi.evaluate.window_trade_display import html

@@ -12,7 +12,7 @@ from piazzi.evaluate.quantities import duration, number
 from piazzi.problem.checks import Array
 
 if TYPE_CHECKING:
-    from rich.console import RenderResult
+    from rich.console import Console, ConsoleOptions, RenderResult
 
     from piazzi.evaluate.window_trade import WindowTrade
 
@@ -71,12 +71,12 @@ def html(trade: WindowTrade) -> str:
     return as_html(grids(trade), sentences(trade))
 
 
-def render(trade: WindowTrade) -> RenderResult:
+def render(trade: WindowTrade, console: Console, options: ConsoleOptions) -> RenderResult:
     """Tables and sentences for rich."""
     from rich.text import Text
 
     for grid in grids(trade):
-        yield from as_rich(grid)
+        yield from as_rich(grid, console, options)
     for line in sentences(trade):
         yield Text(line)
 
@@ -108,7 +108,13 @@ def _trade(trade: WindowTrade) -> Grid:
         cells.append(_graph(trade, len(heads)))
     if any(row.crlb for row in trade.realtime):
         cells.append(_bound(trade, len(heads)))
-    return Grid("Sliding windows, last half of the run", tuple(heads), tuple(cells), left=0)
+    spare = _columns(heads, "tests", "mean NEES\ndelayed", *(f"{g} " for g in trade.groups[1:]), "mean NIS", "mean NEES")
+    return Grid("Sliding windows, last half of the run", tuple(heads), tuple(cells), 0, spare)
+
+
+def _columns(heads: list[str], *starts: str) -> tuple[int, ...]:
+    """Columns whose headings start so, in the order of the starts."""
+    return tuple(dict.fromkeys(i for start in starts for i, head in enumerate(heads) if head.startswith(start)))
 
 
 def _graph(trade: WindowTrade, width: int) -> tuple[str, ...]:
