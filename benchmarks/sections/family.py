@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import cycle
 from typing import Any
 
+import numpy as np
 from cases import Case, apart, calls, recording, variants
 from counting import operations_per_epoch
 from figures import Figure, cpu_seconds, interleaved
@@ -31,6 +33,22 @@ def figures() -> Iterator[Figure]:
     yield Figure("square-root EKF, time alone", root.seconds * 1e3, "ms", note=f"the EKF: {apart(root.mean, ekf)}")
     gain = _last_half(pz.UnscentedKalmanFilter()) / _last_half(EKF)
     yield Figure("UKF's position RMSE, last half", gain, "x", note="of the EKF's")
+    yield from _batch()
+
+
+def _batch() -> Iterator[Figure]:
+    """Batch least squares on an orbit without process noise, started from the truth."""
+    problem, recorded = pz.load(recording())
+    calm = replace(problem, process_noise=pz.ProcessNoise(np.zeros(4), "second", "scaled"))
+    rng = np.random.default_rng(0)
+    cases = [(calm, pz.simulate(calm, recorded.times, rng)) for _ in range(4)]
+    batch = pz.BatchLeastSquares(start=cases[0][1].truth[0])
+    cases = [(calm, pz.Tracking(t.row_times, cases[0][1].values + 1e-6 * rng.normal(size=t.values.shape))) for _, t in cases]
+    rounds, others = batch.estimate(*cases[0]).iterations, cycle(cases)
+    seconds, ratio = interleaved(calls(batch, cases), lambda: cpu_seconds(lambda: EKF.estimate(*next(others))))
+    note = f"{rounds} iterations; each propagates, linearises and rotates; EKF of the same rows"
+    yield Figure("batch, per epoch", seconds / len(recorded.times) * 1e6, "us", ratio=ratio, to="EKF", note=note)
+    yield Figure("  per iteration", seconds / rounds * 1e3, "ms", ratio=ratio / rounds, to="EKF")
 
 
 def _beside(name: str, note: str, estimator: Any, cases: list[Case]) -> Iterator[Figure]:
