@@ -53,7 +53,7 @@ def measurements(ax: Axes, problem: Problem, tracking: Tracking, column: int = 0
 
 
 def innovations(ax: Axes, estimate: Estimate, column: int = 0, *, name: str = "estimate") -> Axes:
-    """One component of the innovations against time, within 3 sigma of what the estimator expected of them."""
+    """One component of the innovations against time, within 3 sigma of what the estimator expected, a band for each station."""
     label, unit = component_of(estimate.problem, column)
     nu, S = estimate.innovations[:, column], estimate.innovation_covariances[:, column, column]
     rows = np.flatnonzero(np.isfinite(nu) & np.isfinite(S))
@@ -62,7 +62,11 @@ def innovations(ax: Axes, estimate: Estimate, column: int = 0, *, name: str = "e
     show = display_of(unit, [float(np.median(band)) if len(rows) else 0.0])
     time = time_axis(ax, estimate.times)
     t = estimate.tracking.row_times[rows] * time.factor
-    ax.fill_between(t, -band * show.factor, band * show.factor, color=shade_of(name), alpha=0.15, lw=0, label="3 sigma")
+    station = estimate.tracking.stations_of(estimate.problem)[rows]
+    for n, s in enumerate(np.unique(station)):  # each has a band of its own
+        part = station == s
+        half = band[part] * show.factor
+        ax.fill_between(t[part], -half, half, color=shade_of(name), alpha=0.15, lw=0, label=None if n else "3 sigma")
     ax.plot(t, nu[rows] * show.factor, ".", ms=2.5, color=shade_of(name), label=plain(name))
     ax.axhline(0, color=MEASURED, lw=0.7)
     limit(ax, t, nu[rows], band, show, shade_of(name))

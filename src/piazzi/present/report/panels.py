@@ -18,6 +18,7 @@ from piazzi.problem.checks import Array
 
 Shown = Array | tuple[Array, ...]  # what a page is given for a line
 SIGMAS = 3.0
+_MOST_STATIONS = 6
 _BENT = 30.0  # a scale is logarithmic where values span more than this factor
 
 
@@ -112,24 +113,38 @@ def _about_zero(label: str, show: Display, sizes: Sequence[Array]) -> Axis:
 
 def innovations(views: Views) -> list[Chart]:
     """For each component of the measurements the innovations of the estimator looked at closely, within three sigma."""
-    problem, tracking = views.comparison.problem, views.comparison.tracking
-    thin = Thinning(len(tracking.row_times))
-    times, out = thin.at_places(tracking.row_times), []
+    problem, out = views.comparison.problem, []
+    parts = _stations(views)
     for column in range(problem.model.width):
         name, unit = component_of(problem, column)
-        lines, ends = [], []
+        bands, points, ends = [], [], []
         for key, e in enumerate(views.estimates):
             nu, S = e.innovations[:, column], e.innovation_covariances[:, column, column]
-            band = SIGMAS * np.sqrt(np.where(np.isnan(nu), np.nan, np.maximum(S, 0.0)))
-            lines.append(Line(times, thin.extremes(band), "3 sigma", key, "band"))
-            lines.append(Line(times, thin.extremes(nu), "innovation", key, "points"))
+            sigma = np.sqrt(np.where(np.isnan(nu), np.nan, np.maximum(S, 0.0)))
             good = np.abs(nu[np.isfinite(nu)])
-            ends.append(max(1.6 * _typical(band), 1.15 * float(np.quantile(good, 0.99)) if good.size else 0.0))
+            ends.append(max(1.6 * SIGMAS * _typical(sigma), 1.15 * float(np.quantile(good, 0.99)) if good.size else 0.0))
+            for station, rows in parts:
+                if np.isnan(nu[rows]).all():
+                    continue
+                thin = Thinning(len(rows))
+                times = thin.at_places(views.comparison.tracking.row_times[rows])
+                bands.append(Line(times, thin.extremes(sigma[rows]), f"3 sigma{station}", key, "band", SIGMAS))
+                points.append(Line(times, thin.extremes(nu[rows]), f"innovation{station}", key, "points"))
         half = max(ends) or 1.0
         show = display_of(unit, [half / 1.6])
         y = Axis(f"innovation of {name}", show, low=-half, high=half)
-        out.append(Chart(f"Innovations of {name}", views.axis, y, lines, single=True, note=views.note(thin)))
+        note = views.note(Thinning(max(len(rows) for _, rows in parts)))
+        out.append(Chart(f"Innovations of {name}", views.axis, y, [*bands, *points], single=True, note=note))
     return out
+
+
+def _stations(views: Views) -> list[tuple[str, Array]]:
+    """Rows of each station with its name as labels end; all rows together for one station, or too many to tell apart."""
+    problem, tracking = views.comparison.problem, views.comparison.tracking
+    index = tracking.stations_of(problem)
+    found = [(f", {s.name}", np.flatnonzero(index == i)) for i, s in enumerate(problem.stations)]
+    found = [(name, rows) for name, rows in found if len(rows)]
+    return found if 1 < len(found) <= _MOST_STATIONS else [("", np.arange(len(index)))]
 
 
 def consistency(views: Views) -> list[Chart]:

@@ -13,22 +13,25 @@ from piazzi.problem.checks import Array
 
 
 def orbits(views: Views, planet_radius: float | None) -> list[Orbit]:
-    """The paths in the plane of the first two components of position, and a close-up of the errors; none without positions."""
-    columns = position_columns(views.comparison.problem)
-    if columns is None:
+    """Paths in the plane of the first two components of position, in space of the first and third too, and close-ups."""
+    if position_columns(views.comparison.problem) is None:
         return []
-    i, j = columns
-    model, thin = views.comparison.problem.model, views.thin
+    i, *others = views.comparison.problem.model.group_indices["position"]
+    return [orbit for j in others[:2] for orbit in _plane(views, (i, j), planet_radius, named=len(others) > 1)]
+
+
+def _plane(views: Views, columns: tuple[int, int], planet_radius: float | None, *, named: bool) -> list[Orbit]:
+    """The paths and a close-up about the truth (else the first estimate) in one plane."""
+    (i, j), model, thin = columns, views.comparison.problem.model, views.thin
     unit = unit_of(model.unit(model.names[c]) for c in columns)
     reference = views.truth if views.truth is not None else views.estimates[0].mean
     limits = _limits(reference[:, [i, j]], planet_radius)
-    far, near = [], []
+    far, near, spread = [], [], []
     if views.truth is not None:
         zero = np.zeros(len(views.times))
         x, y = (thin.at_places(views.truth[:, c]) for c in columns)
         far.append(Track(x, y, "truth"))
         near.append(Track(zero, zero, "truth"))
-    spread = []
     for key, (legend, e) in enumerate(zip(views.keys, views.estimates, strict=True)):
         sigma = sigmas_of(e)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -40,15 +43,14 @@ def orbits(views: Views, planet_radius: float | None) -> list[Orbit]:
         near.append(Track(dx, dy, legend.label, key, *ellipse))
         spread.append(float(np.nanmedian(sigma[:, [i, j]])) if np.isfinite(sigma[:, [i, j]]).any() else 0.0)
     names = (model.names[i], model.names[j])
-    show = display_of(unit, [float(np.abs(limits).max())])
+    show, close = display_of(unit, [float(np.abs(limits).max())]), display_of(unit, [3 * s for s in spread])
     about = "truth" if views.truth is not None else views.keys[0].label
-    close = display_of(unit, [3 * s for s in spread])
+    plane = f", {names[0]} and {names[1]}" if named else ""
     labels = (f"{names[0]} - {about}", f"{names[1]} - {about}")
+    title = f"Close-up about {'the truth' if views.truth is not None else about}{plane}"
     return [
-        Orbit("Orbit", far, names, show, limits, planet_radius, note=_left_out(views)),
-        Orbit(
-            f"Close-up about the {about}" if about == "truth" else f"Close-up about {about}", near, labels, close, close=True
-        ),
+        Orbit(f"Orbit{plane}", far, names, show, limits, planet_radius, note=_left_out(views)),
+        Orbit(title, near, labels, close, close=True),
     ]
 
 
