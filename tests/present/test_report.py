@@ -13,6 +13,8 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi.evaluate import Comparison, compare
+from piazzi.evaluate.consistency import Check
+from piazzi.evaluate.honesty import Honesty
 from piazzi.present.colours import COLOURS, mixed, shade_of, shades
 from piazzi.present.report import Key, Section, Tab, Table, Text, comparison_tab, page, write_page
 from piazzi.present.report.encode import Pool, packed, script_json
@@ -223,15 +225,41 @@ def test_the_best_is_named_with_its_error(comparison):
 
 
 def test_who_is_not_to_be_trusted_is_named_with_the_reason(comparison):
-    assert said(with_rows(comparison, mean_nees_last_half=4 * 9.0))["Too sure of themselves"].startswith(
-        "Errors of ekf are 3.0 times larger"
-    )
     assert "ekf" in said(with_rows(comparison, diverged=True))["Diverged"]
     failed = said(with_rows(comparison, success=False, message="the state left the planet"))
     assert failed["Did not succeed"] == "ekf: the state left the planet."
     assert "ekf" not in failed["Best while measuring"]
-    cautious = said(with_rows(comparison, mean_nees_last_half=4 / 25))
-    assert "ekf" in cautious["More cautious than needed"]
+
+
+def with_nees(row, value: float, low: float = 3.0, high: float = 5.0):
+    """The row with this mean NEES, tested against these bounds."""
+    check = Check(value, low, high, 100.0)
+    return replace(row, mean_nees=value, mean_nees_last_half=value, honesty=Honesty(nees=check, nees_last_half=check))
+
+
+def test_honesty_is_judged_by_the_tests_where_there_are_any(comparison):
+    fair = [with_nees(r, 4.0) for r in comparison.rows]
+    assert said(replace(comparison, rows=tuple(fair)))["Covariance holds"].startswith("Errors of all are as large")
+    sure = said(replace(comparison, rows=(with_nees(fair[0], 36.0), *fair[1:])))
+    assert sure["Too sure of themselves"].startswith("Errors of ekf are 3.0 times as large as the covariance says")
+    assert sure["Covariance holds"].startswith("Errors of all but ekf are")
+    assert "ekf" in said(replace(comparison, rows=(with_nees(fair[0], 1.0), *fair[1:])))["Too cautious"]
+    wide = with_nees(fair[0], 36.0, 0.1, 50.0)  # a run that hangs together so much that even this proves nothing
+    assert "Too sure of themselves" not in said(replace(comparison, rows=(wide, *fair[1:])))
+
+
+def test_honesty_is_judged_by_a_factor_without_tests(comparison):
+    rows = [replace(with_nees(r, 4.0), honesty=Honesty()) for r in comparison.rows]
+    rows[0] = replace(with_nees(rows[0], 36.0), honesty=Honesty())
+    assert "Errors of ekf are 3.0" in said(replace(comparison, rows=tuple(rows)))["Too sure of themselves"]
+
+
+def test_innovations_that_are_not_noise_are_told(comparison):
+    rows = [with_nees(r, 4.0) for r in comparison.rows]
+    odd = replace(rows[0], honesty=replace(rows[0].honesty, whiteness=Check(99.0, 0.0, 18.3, 10), bias=Check(9.0, 0.0, 3.8, 1)))
+    text = said(replace(comparison, rows=(odd, *rows[1:])))["Innovations are not noise"]
+    assert "those of ekf hang together in time and are off to one side" in text
+    assert "Innovations are not noise" not in said(replace(comparison, rows=tuple(rows)))
 
 
 def test_without_truth_the_summary_says_so(comparison):
@@ -248,15 +276,14 @@ def test_lists_of_names():
 
 
 def test_both_views_of_a_window_are_one_name(comparison):
-    cautious = {"mean_nees": 0.1, "mean_nees_last_half": 0.1}
-    rows = [replace(r, **(cautious if r.estimator in ("ekf", "window:10") else {})) for r in comparison.rows]
-    assert said(replace(comparison, rows=tuple(rows)))["More cautious than needed"].startswith(
-        "Errors of ekf and window:10 are"
-    )
-    rows = [replace(r, **(cautious if (r.estimator, r.view) == ("window:10", "delayed") else {})) for r in comparison.rows]
-    assert said(replace(comparison, rows=tuple(rows)))["More cautious than needed"].startswith(
-        "Errors of window:10 delayed are"
-    )
+    def cautious(*chosen: tuple[str, str]) -> str:
+        rows = [with_nees(r, 1.0 if (r.estimator, r.view) in chosen else 4.0) for r in comparison.rows]
+        return said(replace(comparison, rows=tuple(rows)))["Too cautious"]
+
+    both = (("ekf", "realtime"), ("window:10", "realtime"), ("window:10", "delayed"))
+    assert cautious(*both).startswith("Errors of ekf and window:10 are")
+    assert cautious(both[2]).startswith("Errors of window:10 delayed are")
+    assert cautious(both[1]).startswith("Errors of window:10 in real time are")
 
 
 # ---- NIS and colours -----------------------------------------------------------------------------------------------------

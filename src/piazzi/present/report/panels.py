@@ -9,6 +9,7 @@ import numpy as np
 from piazzi.estimate import Estimate
 from piazzi.evaluate.metrics import groups
 from piazzi.evaluate.quantities import Display, display_of, unit_of
+from piazzi.present.colours import DASHES, OTHER
 from piazzi.present.figures.measured import component_of
 from piazzi.present.report.blocks import Axis, Chart, Line
 from piazzi.present.report.thinning import Thinning
@@ -17,6 +18,7 @@ from piazzi.present.squares import Squares, nees_of, nis_of
 from piazzi.problem.checks import Array
 
 Shown = Array | tuple[Array, ...]  # what a page is given for a line
+_WORDS = {"realtime": "real time", "delayed": "delayed"}
 SIGMAS = 3.0
 _MOST_STATIONS = 6
 _BENT = 30.0  # a scale is logarithmic where values span more than this factor
@@ -44,13 +46,28 @@ def group_charts(views: Views) -> list[Chart]:
             out.append(_overlay(views, f"Error of {group}", y_axis, error, f"{group} error"))
         y_axis = Axis(f"expected {group} error", show, "log", low, high)
         title = f"Expected error of {group} (1 sigma)"
-        out.append(_overlay(views, title, y_axis, expected, f"{group} 1 sigma"))
+        out.append(_overlay(views, title, y_axis, expected, f"{group} 1 sigma", _best_possible(views, columns)))
     return out
 
 
-def _overlay(views: Views, title: str, y: Axis, found: Sequence[tuple[Shown, Array]], column: str) -> Chart:
+def _best_possible(views: Views, columns: Sequence[int]) -> list[Line]:
+    """Cramer-Rao bounds of the length of the error, for each view that there is."""
+    out = []
+    kinds = dict.fromkeys(view for _, view in views.found)
+    for view in kinds if views.bounds is not None else ():
+        assert views.bounds is not None
+        variances = np.diagonal(views.bounds.of(view), axis1=1, axis2=2)[:, list(columns)]
+        label = f"best possible{', ' + _WORDS[view] if len(kinds) > 1 else ''} (Cramer-Rao)"
+        values = views.thin.extremes(np.sqrt(np.maximum(variances.sum(axis=1), 0.0)))
+        out.append(Line(views.times, values, label, colour=OTHER, dash=DASHES[2 if view == "realtime" else 3]))
+    return out
+
+
+def _overlay(
+    views: Views, title: str, y: Axis, found: Sequence[tuple[Shown, Array]], column: str, more: Sequence[Line] = ()
+) -> Chart:
     lines = [Line(views.times, shown, key.label, i) for i, (key, (shown, _)) in enumerate(zip(views.keys, found, strict=True))]
-    return Chart(title, views.axis, y, lines, note=views.note(), column=column)
+    return Chart(title, views.axis, y, [*lines, *more], note=views.note(), column=column)
 
 
 def _expected(views: Views, estimate: Estimate, columns: Sequence[int]) -> tuple[Shown, Array]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from piazzi.estimate import Estimate
 from piazzi.evaluate import Comparison
+from piazzi.evaluate.bounds import Bounds, posterior_bounds
 from piazzi.evaluate.metrics import known_truth
 from piazzi.evaluate.quantities import Display
 from piazzi.present.colours import dash_of, label_of, shades
@@ -26,6 +27,7 @@ class Views:
     truth : (K, n), or None where nothing of it is known
     thin : which epochs are shown
     times : (k,), their times, s
+    bounds : Cramer-Rao bounds at the truth, where the comparison has looked for them
     show_time : unit of the axis of time
     """
 
@@ -36,6 +38,7 @@ class Views:
     thin: Thinning
     times: Array
     show_time: Display
+    bounds: Bounds | None = None
 
     @classmethod
     def of(cls, comparison: Comparison) -> Views:
@@ -46,7 +49,9 @@ class Views:
         keys = tuple(Key(label_of(name, view), colours[name], dash_of(name, view, names)) for name, view in found)
         truth = known_truth(next(iter(found.values()))) if found else None
         thin = Thinning(len(times))
-        return cls(comparison, found, keys, truth, thin, thin.at_places(times), time_display(times))
+        bounded = any(row.crlb for row in comparison.rows)
+        bounds = posterior_bounds(comparison.problem, comparison.tracking) if bounded else None
+        return cls(comparison, found, keys, truth, thin, thin.at_places(times), time_display(times), bounds)
 
     @property
     def axis(self) -> Axis:

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf, isfinite
+from math import isfinite
 
 from piazzi.evaluate import Comparison, Row
-from piazzi.evaluate.display import expected_nis, group_display
+from piazzi.evaluate.display import expected_nis, failing, group_display
 from piazzi.evaluate.quantities import duration, number, sigma_factor
-from piazzi.present.report.blocks import Point
+from piazzi.present.report.blocks import Point, Tone
 
 _HEADING = {"realtime": "Best while measuring", "delayed": "Best with all in hand"}
 _PART = {"realtime": "in the last half of the run", "delayed": "over the whole run"}
 _VIEW = {"realtime": "in real time", "delayed": "delayed"}
+_FAULTS = {"NIS": "have the wrong size", "whiteness": "hang together in time", "bias": "are off to one side"}
+_CLAIMS: tuple[tuple[int, str, Tone], ...] = (
+    (1, "Too sure of themselves", "bad"),
+    (0, "Covariance holds", "good"),
+    (-1, "Too cautious", "plain"),
+)
 _LEVEL = 1.01  # errors nearer than this are called the same
 _HONEST = 1.5  # one run cannot tell a smaller factor
 _FEW = 3  # names that a sentence lists before it counts them
@@ -31,6 +37,7 @@ def points(comparison: Comparison) -> list[Point]:
         out.append(Point("Errors unknown", "There is no truth to compare with: here is what estimators say of themselves."))
     out += _failed(rows)
     out += _honesty(comparison, sound, known)
+    out += _against(sound)
     out += _settling(comparison, sound)
     out += _cost(rows)
     return out or [Point("Nothing to show", "No estimator gave a result.", "bad")]
@@ -57,7 +64,17 @@ def _best(comparison: Comparison, rows: Sequence[Row], view: str) -> list[Point]
         text += "; there is no other to compare with"
     if others and others[-1] < _HONEST * best:
         text += ", which may be the luck of one run"
+    text += _bound(comparison, first, group)
     return [Point(_HEADING[view], f"{text}.", "good")]
+
+
+def _bound(comparison: Comparison, row: Row, group: str) -> str:
+    """What the best error could be on average, where that is known."""
+    bound = (row.crlb_last_half if row.view == "realtime" else row.crlb).get(group)
+    if bound is None or not isfinite(bound):
+        return ""
+    show = group_display(comparison, group)
+    return f". Over many such runs no unbiased estimator does better than {number(bound * show.factor, 3)}{show.suffix}"
 
 
 def _first_group(rows: Sequence[Row]) -> str:
@@ -96,38 +113,56 @@ def _failed(rows: Sequence[Row]) -> list[Point]:
     return out
 
 
+def _judged(row: Row, known: bool, n: float, m: float | None) -> tuple[float, int] | None:
+    """Errors (else innovations) in units of what the covariance says, and 1 where they are too large, -1 too small, else 0.
+
+    By the test of mean NEES that allows for correlation in time, where there is one; else by a factor that one run can tell.
+    """
+    early = row.view != "realtime"
+    value, expected = ((row.mean_nees if early else row.mean_nees_last_half), n) if known else (row.mean_nis, m)
+    if value is None or not isfinite(value) or not expected:
+        return None
+    factor = sigma_factor(value, expected)
+    check = (row.honesty.nees if early else row.honesty.nees_last_half) if known else row.honesty.nis
+    if check is None or not isfinite(check.high):
+        return factor, int(factor > _HONEST) - int(factor < 1 / _HONEST)
+    return factor, int(check.statistic > check.high) - int(check.statistic < check.low)
+
+
 def _honesty(comparison: Comparison, rows: Sequence[Row], known: bool) -> list[Point]:
     """Whose covariance can be taken at its word."""
-    n, m = comparison.problem.model.n, expected_nis(comparison)
-    factors: list[tuple[Row, float]] = []
-    for r in rows:
-        nees = r.mean_nees_last_half if r.view == "realtime" else r.mean_nees
-        value, expected = (nees, float(n)) if known else (r.mean_nis, m)
-        if value is not None and isfinite(value) and expected:
-            factors.append((r, sigma_factor(value, expected)))
-    what, judged = "Errors" if known else "Innovations", [r for r, _ in factors]
-    small = [(r, f) for r, f in factors if f > _HONEST]
-    large = [(r, f) for r, f in factors if f < 1 / _HONEST]
-    fair = [r for r, f in factors if 1 / _HONEST <= f <= _HONEST]
+    n, m = float(comparison.problem.model.n), expected_nis(comparison)
+    found = [(r, judged) for r in rows if (judged := _judged(r, known, n, m)) is not None]
+    judged_rows, what = [r for r, _ in found], "Errors" if known else "Innovations"
     out = []
-    if small:
-        names, size = _named([r for r, _ in small], judged), _span([f for _, f in small])
-        text = (
-            f"{what} of {names} are {size} times larger than the covariance says: widen it, or find what the model leaves out."
-        )
-        out.append(Point("Too sure of themselves", text, "bad"))
-    if fair:
-        text = f"{what} of {_named(fair, judged)} are about as large as the covariance says, as far as one run can tell."
-        out.append(Point("Covariance holds", text, "good"))
-    if large:
-        names, size = _named([r for r, _ in large], judged), _span([1 / f if f > 0 else inf for _, f in large])
-        out.append(
-            Point(
-                "More cautious than needed",
-                f"{what} of {names} are {size} times smaller than the covariance says, in this one run.",
-            )
-        )
+    for sign, heading, tone in _CLAIMS:
+        chosen = [(r, factor) for r, (factor, where) in found if where == sign]
+        if chosen:
+            names, factors = _named([r for r, _ in chosen], judged_rows), [f for _, f in chosen]
+            out.append(Point(heading, f"{what} of {names} are {_claim(sign, factors)}.", tone))
     return out
+
+
+def _claim(sign: int, factors: Sequence[float]) -> str:
+    if sign > 0:
+        return f"{_span(factors)} times as large as the covariance says: widen it, or find what the model leaves out"
+    if sign < 0:
+        return f"only {_span(factors)} times as large as the covariance says"
+    return "as large as the covariance says, as far as one run can tell"
+
+
+def _against(rows: Sequence[Row]) -> list[Point]:
+    """Whose innovations speak against the model, and in which way."""
+    wrong: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        tests = tuple(_FAULTS[name] for name in failing(row) if name in _FAULTS)
+        if tests:
+            wrong.setdefault(tests, []).append(row)
+    if not wrong:
+        return []
+    parts = [f"those of {_named(found, rows)} {listed(tests)}" for tests, found in wrong.items()]
+    text = f"Innovations should be noise, but {'; '.join(parts)} (tests at the 5 % level)."
+    return [Point("Innovations are not noise", text, "bad")]
 
 
 def _span(factors: Sequence[float]) -> str:
@@ -165,7 +200,16 @@ def _settling(comparison: Comparison, rows: Sequence[Row]) -> list[Point]:
     show = group_display(comparison, group)
     ends = dict.fromkeys(f"{number(v * show.factor, 3)}{show.suffix}" for v in (min(sizes), max(sizes)))
     text = f"Over the whole run the {group} error of {_named(slow, rows)} is {' to '.join(ends)} (RMS)"
-    return [Point("Not before it settles", f"{text}: do not use the first estimates.", "bad")]
+    return [Point("Not before it settles", f"{text}: do not use the first estimates{_settled(slow)}.", "bad")]
+
+
+def _settled(rows: Sequence[Row]) -> str:
+    """When they have settled, where that is known."""
+    found = [r.convergence_time for r in rows if r.convergence_time is not None and isfinite(r.convergence_time)]
+    if not found:
+        return ""
+    ends = dict.fromkeys(duration(t) for t in (min(found), max(found)))
+    return f" before {' to '.join(ends)}, when they have settled"
 
 
 def _cost(rows: Sequence[Row]) -> list[Point]:
