@@ -65,8 +65,9 @@ def test_the_same_bytes_every_time():
     assert a.details["modes"] == b.details["modes"]
 
 
+@pytest.mark.parametrize("solver", ["chain", "bordered"])
 @pytest.mark.parametrize("rank", [None, 0])
-def test_a_linear_problem_has_one_mode_and_laplace_is_exact(monkeypatch, rank):
+def test_a_linear_problem_has_one_mode_and_laplace_is_exact(monkeypatch, rank, solver):
     """log N(z; H m, H P H^T + R) by dense algebra: equal up to a constant, whatever the measurements and the prior's width."""
     monkeypatch.setenv("PIAZZI_JIT", "0")
     offsets = []
@@ -81,7 +82,8 @@ def test_a_linear_problem_has_one_mode_and_laplace_is_exact(monkeypatch, rank):
         )
         for size in (0.1, 1.0):
             tracking = pz.Tracking(case.tracking.row_times, size * case.values, case.tracking.row_stations)
-            estimate = pz.FactorGraph(start="bank").estimate(problem, tracking)
+            estimate = pz.FactorGraph(start="bank", solver=solver).estimate(problem, tracking)
+            assert estimate.details["solver"] == solver
             (mode,) = estimate.details["modes"]
             assert mode["probability"] == 1.0
             assert_same_estimate(estimate, pz.FactorGraph().estimate(problem, tracking), 1e-6)

@@ -82,6 +82,7 @@ class BorderedSolver:
     def widest(self) -> float:
         return float(self.chain.report[WIDEST])
 
+    @np.errstate(all="ignore")
     def solve(self, damping: float) -> None:
         c, i, nd = self.chain, self.chain.inputs, self.nd
         self._split()
@@ -145,6 +146,7 @@ class BorderedSolver:
             W[:, nd:] = self.sigma[:, None] * self.inverse[nd:]
         return W
 
+    @np.errstate(all="ignore")  # iterations that fail end in what is not finite, which the result tells
     def _covariances(self, keep_cross: bool) -> tuple[Array, Array]:
         """Covariances of all values (K, n, n), and of each state with the next (K - 1, n, n)."""
         c, i, nd = self.chain, self.chain.inputs, self.nd
