@@ -412,3 +412,13 @@ def test_gate_takes_no_outlier(estimator, monkeypatch):
     values[gated.details["rejected"]] = np.nan
     without = estimator.estimate(problem, pz.Tracking(tracking.row_times, values, tracking.row_stations))
     assert_same_estimate(gated, without, 1e-12)
+
+
+@EACH
+def test_lanes_and_compiler_change_nothing(estimator, monkeypatch):
+    """Points carried several at a time by compiled code, and one after the other on NumPy arrays."""
+    problem = satellite()
+    tracking = pz.simulate(problem, np.arange(60) * 15.0, np.random.default_rng(1))
+    compiled = estimator.estimate(problem, tracking)
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    assert_same_estimate(estimator.estimate(problem, tracking), compiled, 1e-9)

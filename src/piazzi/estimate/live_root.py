@@ -48,9 +48,14 @@ class LiveRootFilter:
 
     def predict(self, t: float) -> None:
         """Carry the belief to time `t`, from the last epoch that had a measurement; raises ValueError where `t` is earlier."""
+        if self._move(t):
+            self._run()
+
+    def _move(self, t: float) -> bool:
+        """Close the epoch that stands, unless `t` belongs to it; whether a new one began."""
         measured = len(self._values) > 0
         if measured and t == self.time:
-            return
+            return False
         if measured:
             before, self._clock.time = self._clock.time, self.time
             try:
@@ -62,7 +67,7 @@ class LiveRootFilter:
             self._values, self._rows_of = self._values[:0], self._rows_of[:0]
         self._clock.interval(t)
         self.time = t
-        self._run()
+        return True
 
     def update(self, station: str, z: Any, t: float | None = None) -> None:
         """Take in a measurement of a station, at `t` or where the last prediction stands; NaN where a component is missing.
@@ -74,7 +79,7 @@ class LiveRootFilter:
         """
         s = checked_measurement(self.problem, self._stations, station, z, self._row)
         if t is not None:
-            self.predict(t)
+            self._move(t)
         elif self.time is None:
             raise ValueError(
                 "the time of the first measurement is not known: call predict(t) first, or give the problem a prior_time"

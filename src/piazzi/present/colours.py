@@ -10,6 +10,7 @@ from math import log2
 COLOURS = {
     "ekf": "#0072B2",
     "iekf": "#56B4E9",
+    "srekf": "#004C7A",
     "ukf": "#CC79A7",
     "graph": "#D55E00",
     "window": "#009E73",
