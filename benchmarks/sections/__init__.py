@@ -8,6 +8,7 @@ SECTIONS = {
     "family": "unscented and square-root filters and the smoother beside the EKF, by time and by operations",
     "filterpy": "extended and unscented Kalman filters beside filterpy",
     "start_up": "whole processes: warm, cold, help, import",
+    "study": "many runs in lanes beside the C floor, and a study of 10,000 runs: time, memory, second core",
     "live": "one measurement at a time",
     "files": "files of a million measurements",
     "length": "time per epoch and memory against the number of epochs",

@@ -39,6 +39,7 @@ def cluster(workers=2, environment=None):
     started = [subprocess.Popen([*scheduler, "--no-dashboard"], **quiet)]
     worker = [*command[:-1], "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
     try:
+        _until_it_listens(address)
         started += [subprocess.Popen(worker, **quiet) for _ in range(workers)]
         yield address, started
     finally:
@@ -51,6 +52,15 @@ def cluster(workers=2, environment=None):
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+
+
+def _until_it_listens(address):
+    host, port = address.removeprefix("tcp://").split(":")
+    for _ in range(600):
+        with contextlib.suppress(OSError), socket.create_connection((host, int(port)), timeout=1):
+            return
+        time.sleep(0.1)
+    raise AssertionError(f"nothing listens at {address}")
 
 
 def study_program(*arguments):

@@ -61,9 +61,9 @@ def test_filter_in_lanes_is_the_filter(name):
         assert_allclose(scores.nis[run], nis(estimate).value, rtol=1e-7, atol=1e-9)
         for g, columns in enumerate(groups.values()):
             expected = rmse(errors(estimate), columns)
-            assert np.sqrt(scores.squared[run, :, g].mean()) == pytest.approx(expected, rel=1e-9)
+            assert np.sqrt(scores.squared[run, g].mean()) == pytest.approx(expected, rel=1e-9)
             spread = np.diagonal(estimate.covariance, axis1=1, axis2=2)[:, list(columns)].sum(axis=1)
-            assert_allclose(scores.spread[run, :, g], spread, rtol=1e-8)
+            assert_allclose(scores.spread[run, g], spread, rtol=1e-8)
 
 
 @pytest.mark.parametrize("name", ["satellite", "b612", pytest.param("network", marks=pytest.mark.slow)])
@@ -130,7 +130,7 @@ def test_bound_is_the_riccati_recursion_at_the_truth():
             S = H[k] @ P @ H[k].T + problem.stations[0].noise
             P = P - P @ H[k].T @ np.linalg.solve(S, H[k] @ P)
             spread.append(P[0, 0] + P[1, 1])
-        assert_allclose(scores.spread[run, :, 0], spread, rtol=1e-8)
+        assert_allclose(scores.spread[run, 0], spread, rtol=1e-8)
         assert_allclose(covariance[run], P, rtol=1e-6, atol=1e-9 * np.abs(P).max())
 
 

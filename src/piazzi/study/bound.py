@@ -67,7 +67,7 @@ def _realtime(study: Study, actual: Problem, truth: Array, z: Array, trackings: 
         return _mean(study, actual, trackings, "realtime")
     _, _, scores = filter_runs(layout, z, truth, at_truth=True)
     assert scores is not None
-    return np.asarray(scores.spread.mean(axis=0)), len(z)
+    return np.asarray(scores.spread.mean(axis=0).T), len(z)
 
 
 def _mean(study: Study, actual: Problem, trackings: list[Tracking], view: str) -> tuple[Array, int]:

@@ -79,8 +79,8 @@ class Scores:
 
     Attributes
     ----------
-    squared : (M, K, G), squared length of the error in each group of states
-    spread : (M, K, G), the variance that the covariance gives it
+    squared : (M, G, K), squared length of the error in each group of states
+    spread : (M, G, K), the variance that the covariance gives it
     nees : (M, K)
     nis : (M, J), of each row of measurements at its prediction
     lowest : (M,), smallest pivot of a correlation matrix on the way: what is not far above rounding needs another look
@@ -172,7 +172,7 @@ def filter_runs(
     z, states = _padded(lanes, z, np.zeros((M, 0, 0)) if truth is None else truth)
     runs = len(z)
     mean, P, lowest = np.empty((runs, n)), np.empty((runs, n, n)), np.empty(runs)
-    squared, spread = np.empty((2, runs, K if scored else 0, groups))
+    squared, spread = np.empty((2, runs, groups, K if scored else 0))
     nees, nis = np.empty((runs, K if scored else 0)), np.empty((runs, J if scored else 0))
     _library(problem, lanes).filter_lanes(
         runs,

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,7 @@ class _Runs:
     world: Problem
     belief: Problem
     layout: Layout
+    believed: Layout
     truth: Array
     z: Array
     wrong: list[str]
@@ -110,18 +112,23 @@ def _piece(task: Task, found: list[tuple[Scored, list[str]]]) -> Piece:
 # ---- simulation --------------------------------------------------------------------------------------------------------
 
 
+@lru_cache(maxsize=4)
+def _at_point(study: Study, point: int) -> tuple[Problem, Problem, Problem, Layout, Layout]:
+    """The problem as it is measured, as it is believed to be and as it moves; layouts of the first two."""
+    world, belief = study.problems(point)
+    return world, belief, true_problem(world), Layout(world, study.times), Layout(belief, study.times)
+
+
 def simulated(study: Study, task: Task) -> _Runs:
     """Truths and measurements of the runs of a task."""
-    world, belief = study.problems(task.point)
-    actual = true_problem(world)
+    world, belief, actual, layout, believed = _at_point(study, task.point)
     draws = draw(world, actual, task.runs, study.seed, len(study.times))
-    layout = Layout(world, study.times)
     noisy = world.truth is None or world.truth.measurement_noise
     if in_lanes(actual) and compiles(simulate_runs, layout, actual, draws.first[:1], draws.w[:1], draws.v[:1], noisy):
         truth, z = simulate_runs(layout, actual, draws.first, draws.w, draws.v, noisy)
     else:
         truth, z = _one_by_one(world, actual, study.times, draws, noisy)
-    return _Runs(world, belief, layout, truth, z, _faults(world, actual, study.times, draws, truth, z))
+    return _Runs(world, belief, layout, believed, truth, z, _faults(world, actual, study.times, draws, truth, z))
 
 
 def _one_by_one(world: Problem, actual: Problem, times: Array, draws: Draws, noisy: bool) -> tuple[Array, Array]:
@@ -180,7 +187,7 @@ def _filter(study: Study, runs: _Runs, left: list[int], out: Scored) -> list[int
     """Put the scores of the extended Kalman filter of these runs in place; returns the runs that need a closer look."""
     if not left:
         return []
-    layout = Layout(runs.belief, study.times)
+    layout = runs.believed
     if not compiles(filter_runs, layout, runs.z[left[:1]], runs.truth[left[:1]]):
         return left
     whole = len(left) == len(runs.truth)
@@ -192,6 +199,9 @@ def _filter(study: Study, runs: _Runs, left: list[int], out: Scored) -> list[int
     sound = np.isfinite(mean).all(axis=1) & np.isfinite(scores.nees).all(axis=1) & np.isfinite(scores.nis).all(axis=1)
     sound &= scores.lowest > _DOUBTFUL
     scored = score_lanes(scores, runs.belief.model.n, study.kept, seconds)
+    if whole and sound.all():
+        _copy(scored, slice(None), out, slice(None))
+        return []
     for i, run in enumerate(left):
         if sound[i]:
             _copy(scored, i, out, run)
@@ -212,7 +222,7 @@ def _one(study: Study, label: str, estimator: Any, runs: _Runs, i: int) -> dict[
         return dict.fromkeys(views_of(estimator), (empty, message))
 
 
-def _copy(source: Scored, i: int, target: Scored, j: int) -> None:
+def _copy(source: Scored, i: int | slice, target: Scored, j: int | slice) -> None:
     for name, values in target.numbers.items():
         values[j] = source.numbers[name][i]
     for field in ("success", "diverged", "error", "nees"):

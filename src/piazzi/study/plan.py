@@ -32,7 +32,7 @@ MOST_POINTS = 100_000
 MOST_ESTIMATES = 10**9
 MOST_EPOCHS = 121  # epochs at which every run is kept; scores are over all of them
 BOUND_RUNS = 512  # truths that the Cramer-Rao bound is averaged over
-_PIECE_BYTES = 48e6
+_PIECE_BYTES = 8e6  # what is worked on at once stays near the processor
 
 
 @dataclass(frozen=True, eq=False)

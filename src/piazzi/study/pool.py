@@ -74,7 +74,7 @@ class Here:
 class Processes:
     """Worker processes, each with a thread that feeds it: a death is known at once, with the task that it was about.
 
-    They are new interpreters that import nothing of the caller's program, so a script needs no guard.  The second starts when
+    They are new interpreters that import nothing of the caller's program, so a script needs no guard.  The others begin when
     the first has finished a task: by then, every kernel is compiled.
     """
 
@@ -115,19 +115,18 @@ class Processes:
         return [p.pid for p in self._processes.values() if p.poll() is None]
 
     def _serve(self, index: int) -> None:
+        process = self._processes[index] = self._start()
         if index:
             self._warm.wait()
-        process: subprocess.Popen[bytes] | None = None
         while not self._closed:
             task = self._tasks.get()
             if task is None:
                 break
-            if process is None or process.poll() is not None:
+            if process.poll() is not None:
                 process = self._processes[index] = self._start()
             self._outcomes.put(self._run(process, task))
             self._warm.set()
-        if process is not None:
-            end(process)
+        end(process)
 
     def _start(self) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-c", "from piazzi.study.worker import main; main()"]

@@ -129,10 +129,15 @@ def missing(study: Study, log: Log) -> Iterator[Task]:
         else:
             bounds.add(entry.task.point)
     for point in range(study.points):
-        at = 0
+        at, gaps = 0, []
         for first, count in [*sorted(have.get(point, [])), (study.runs, 0)]:
             if first > at:
-                yield Task(point, at, first - at)
+                gaps.append(Task(point, at, first - at))
             at = max(at, first + count)
-        if point not in bounds:
-            yield Task(point, 0, 0)
+        if point not in bounds:  # after a first few runs, which compile, and before the last, which end together
+            if gaps and gaps[0].count > FIRST_PIECE:
+                head = gaps.pop(0)
+                rest = Task(point, head.first + FIRST_PIECE, head.count - FIRST_PIECE)
+                gaps = [Task(point, head.first, FIRST_PIECE), rest, *gaps]
+            gaps.insert(1, Task(point, 0, 0))
+        yield from gaps

@@ -55,7 +55,7 @@ def score_lanes(scores: Scores, n: int, kept: Array, seconds: float) -> Scored:
     """Scores of runs in lanes, all of which succeeded, with definite covariances."""
     M, K = scores.nees.shape
     half = slice(K // 2, None)
-    squared = np.ascontiguousarray(scores.squared.transpose(0, 2, 1))  # sums run along memory: the same bits in any company
+    squared = scores.squared  # sums run along memory: the same bits in any company
     later, earlier = squared[:, :, 3 * K // 4 :], squared[:, :, K // 2 : 3 * K // 4]
     numbers = {
         "rmse": _root_mean(squared),
@@ -71,12 +71,12 @@ def score_lanes(scores: Scores, n: int, kept: Array, seconds: float) -> Scored:
         diverged &= (_root_mean(later) >= 0.5 * _root_mean(earlier)).all(axis=1)
     else:
         diverged[:] = False
-    error = np.sqrt(scores.squared[:, kept])
+    error = np.sqrt(squared[:, :, kept]).transpose(0, 2, 1)
     return Scored(numbers, np.ones(M, dtype=bool), diverged, error, scores.nees[:, kept])
 
 
 def _root_mean(squared: Array) -> Array:
-    return np.asarray(np.sqrt(np.ascontiguousarray(squared).mean(axis=2)))
+    return np.asarray(np.sqrt(squared.mean(axis=2)))
 
 
 def score_estimate(name: str, estimate: Estimate, groups: dict[str, tuple[int, ...]], kept: Array) -> tuple[Scored, str]:

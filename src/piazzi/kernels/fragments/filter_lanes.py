@@ -115,7 +115,7 @@ def filter_lanes(
                 x = x + d
             if scored:
                 e = x - load_lanes(truth, (run * K + k) * N, N, K * N, LANES)
-                squared_lanes((run * K + k) * groups, member, groups, e, P, work, squared, spread, K * groups)
+                squared_lanes(run * groups * K + k, K, member, groups, e, P, work, squared, spread)
                 q, pivot = nees_lanes(e, P, ones, work)
                 least = minimum(least, pivot)
                 store_lanes(nees, run * K + k, K, vector(q))

@@ -30,7 +30,7 @@ def nees_lanes(e, P, one, work):
 
 
 @inline
-def squared_lanes(at, member, groups, e, P, work, squared, spread, stride):
+def squared_lanes(at, step, member, groups, e, P, work, squared, spread):
     """Squared length of the error in each group of states, and the variance that the covariance gives it."""
     store_packs(work, 0, P, LANES)
     store_packs(work, N * N * LANES, e, LANES)
@@ -42,7 +42,7 @@ def squared_lanes(at, member, groups, e, P, work, squared, spread, stride):
                 error = load_packs(work, (N * N + i) * LANES, 1, LANES)[0]
                 length = length + error * error
                 variance = variance + load_packs(work, (i * N + i) * LANES, 1, LANES)[0]
-        store_lanes(squared, at + g, stride, vector(length))
-        store_lanes(spread, at + g, stride, vector(variance))
+        store_lanes(squared, at + g * step, groups * step, vector(length))
+        store_lanes(spread, at + g * step, groups * step, vector(variance))
     for i in range(N):
         store_packs(work, (N * N + N + i) * LANES, load_packs(work, (i * N + i) * LANES, 1, LANES), LANES)
