@@ -32,6 +32,19 @@ def test_an_example_is_sound_and_its_graph_knows_its_errors(path):
     assert (abs(error) < 5 * sigma).all()  # 5 sigma at every epoch and state: an honest covariance
 
 
+def test_a_newcomers_problem_is_pictured(tmp_path):
+    """As its writer would: one command, and a page that shows what was measured and how far off the estimate is."""
+    path, page = next(p for p in EXAMPLES if p.stem == "falling_probe"), tmp_path / "page.html"
+    made = subprocess.run(
+        [PIAZZI, "report", str(path), "--with", "graph", "-o", str(page)], capture_output=True, text=True, timeout=300
+    )
+    assert made.returncode == 0, made.stderr
+    text = page.read_text()
+    assert text.count("<svg") + text.count("<canvas") > 0
+    for name in ("height", "speed", "drag"):
+        assert name in text
+
+
 @pytest.mark.slow
 def test_the_founding_papers_figures(data_dir, tmp_path):
     folder = data_dir / "satellite"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -120,11 +122,21 @@ def _conclude(wrote: list[Path], folder: Path) -> None:
         "",
         "Next:",
     ]
+    program = _program()
     for typed, why in (
-        ("piazzi compare b612-range-q0", "the same probe, by filters that trust its dynamics entirely"),
-        (f"piazzi estimate {kept} --scenario {PROBLEMS[1]}", "the last state in numbers"),
-        ("piazzi scenarios show b612-range > mine.toml", "a problem of your own: edit it, then piazzi compare mine.toml"),
-        ("piazzi --help", "everything else"),
+        ("compare b612-range-q0", "the same probe, by filters that trust its dynamics entirely"),
+        (f"estimate {kept} --scenario {PROBLEMS[1]}", "the last state in numbers"),
+        ("scenarios show b612-range > mine.toml", f"a problem of your own: edit it, then {program} compare mine.toml"),
+        ("--help", "everything else"),
     ):
-        lines += [f"  {typed}", f"      {why}"]
+        lines += [f"  {program} {typed}", f"      {why}"]
     output.print_text("\n".join(lines))
+
+
+def _program() -> str:
+    """What to type for piazzi here: its path, where a shell does not find it by its name."""
+    called = Path(sys.argv[0])
+    if called.name != "piazzi" or shutil.which("piazzi") is not None or not called.is_file():
+        return "piazzi"
+    inside = called.absolute().is_relative_to(Path.cwd())
+    return str(called.absolute().relative_to(Path.cwd()) if inside else called)
