@@ -209,3 +209,14 @@ def test_the_rows_of_a_comparison_with_a_gate_are_one_table(call, tmp_path):
     plain, gated = csv.DictReader((tmp_path / "rows.csv").read_text().splitlines())
     assert plain["rejected"] == ""
     assert f"The gate of ekf:gate=0.9 rejected {gated['rejected']} of 100 measurements." in result.out
+
+
+def test_an_optimisation_tells_how_it_ended(call):
+    """Solver, start, cost, gradient and defect: for a reader, and in numbers."""
+    graph = pz.FactorGraph().estimate(*pz.load(SCENARIO))
+    details = call("estimate", SCENARIO, "--with", "graph", "--json").document["rows"][0]["details"]
+    assert (details["solver"], details["start"], details["cost"]) == ("chain", "ekf", graph.details["cost"])
+    assert details.keys() >= {"gradient_norm", "defect"}
+    (line,) = [s for s in call("estimate", SCENARIO, "--with", "graph").out.splitlines() if s.startswith("Solver")]
+    assert line.startswith(f"Solver chain, started from ekf: {graph.iterations} iterations, cost {graph.details['cost']:.6g},")
+    assert "Solver" not in call("estimate", SCENARIO).out

@@ -126,10 +126,19 @@ def to_dict(comparison: Comparison, forecasts: Mapping[str, Forecast]) -> dict[s
                 "mean": [finite(v) for v in estimate.mean[-1].tolist()],
                 "sigma": [finite(v**0.5) if v >= 0 else None for v in variances],
             }
+            row["details"] = _plain_details(estimate)
             row["residual_rms"] = {name: finite(v) for name, v in residual_rms(estimate).items()}
         if row["estimator"] in forecasts:
             row["prediction"] = prediction(forecasts[row["estimator"]])
     return document
+
+
+def _plain_details(estimate: Estimate) -> dict[str, Any]:
+    """What the estimator tells of itself in single numbers and words, such as its cost, its solver and where it started."""
+    from piazzi.evaluate.quantities import finite
+
+    plain = {k: v for k, v in estimate.details.items() if v is None or isinstance(v, bool | int | float | str)}
+    return {k: finite(v) if isinstance(v, float) else v for k, v in plain.items()}
 
 
 def prediction(forecast: Forecast) -> dict[str, Any]:
@@ -169,10 +178,10 @@ def series(estimate: Estimate) -> dict[str, Any]:
 
 
 def _print(comparison: Comparison, source_name: str, output_file: str | None, forecasts: Mapping[str, Forecast]) -> None:
-    from piazzi.present.tables import forecast_table, heading, residual_line, state_table
+    from piazzi.present.tables import forecast_table, heading, residual_line, solver_line, state_table
 
     parts: list[Any] = [heading(comparison.problem, comparison.tracking, source_name), ""]
     for name, estimate in comparison.estimates.items():  # at the last epoch both views of a window are one
-        parts += [state_table(name, estimate), *residual_line(estimate), ""]
+        parts += [state_table(name, estimate), *residual_line(estimate), *solver_line(estimate), ""]
         parts += [forecast_table(name, forecasts[name]), ""] if name in forecasts else []
     output.print_rich(*parts, comparison, *([f"Wrote {output_file}"] if output_file and comparison.estimates else []))

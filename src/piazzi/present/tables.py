@@ -65,6 +65,18 @@ def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
     return Group(Text(printable(title), style="bold"), table)
 
 
+def solver_line(estimate: Estimate) -> list[str]:
+    """How an optimisation ended, for estimators that tell of one: its solver, start, cost, gradient and dynamics defect."""
+    told = estimate.details
+    if not {"solver", "start", "cost"} <= told.keys():
+        return []
+    numbers = [f"cost {told['cost']:.6g}"]
+    numbers += [f"gradient {told['gradient_norm']:.1g}"] if "gradient_norm" in told else []
+    numbers += [f"dynamics defect {told['defect']:.1g} sigma"] if "defect" in told else []
+    steps = f"{estimate.iterations} iteration{'s' * (estimate.iterations != 1)}"
+    return [f"Solver {told['solver']}, started from {told['start']}: {steps}, {', '.join(numbers)}"]
+
+
 def residual_line(estimate: Estimate) -> list[Any]:
     """One line with what is left of the measurements, by component; none where the estimator kept no residuals."""
     from rich.text import Text
