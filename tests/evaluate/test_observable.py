@@ -172,6 +172,7 @@ def test_a_continuum_of_solutions_is_no_row_of_twins():
         assert np.hypot(*twin.state[:2]) == pytest.approx(np.hypot(*first[:2]), rel=1e-5)
         assert np.hypot(*twin.state[2:]) == pytest.approx(np.hypot(*first[2:]), rel=1e-5)
     assert "a continuum of first states" in found.verdict
+    assert "Verdict: observability." in found.verdict
     assert len(found.verdict) < 600
 
 

@@ -41,9 +41,7 @@ def _local(found: Observability) -> list[str]:
     if blind:
         unseen = [name for name, s in zip(model.names, found.crlb_sigma.tolist(), strict=True) if not np.isfinite(s)]
         many = f"{blind} of {model.n} directions of the first state {'is' if blind == 1 else 'are'} not observable"
-        return [
-            f"Observability: {many}: a step along {direction} changes no measurement, so {', '.join(unseen)} have no bound."
-        ]
+        return [f"Observability: {many}: a step along {direction} changes no measurement; no bound for {', '.join(unseen)}."]
     sigmas = []
     for name, s in zip(model.names, found.crlb_sigma.tolist(), strict=True):
         show = display_of(model.unit(name), [s])
@@ -96,14 +94,14 @@ def _conclusion(found: Observability) -> list[str]:
     attained = float(np.sqrt(quantile(_LUCK, found.problem.model.n) / found.problem.model.n))
     if stray:
         out.append(f"Verdict: a twin; {' and '.join(stray)} ended on its orbit.")
-    elif (found.singular_values == 0).any():
-        out.append("Verdict: observability; what cannot be seen stays as uncertain as the prior.")
     elif graph.excess <= attained < ekf.excess and ekf.excess > _CLEARLY * graph.excess:
         out.append(
             "Verdict: linearisation. The information is there and the graph gets it; neither lack of observability nor a twin "
             "is what spoils the EKF, but its Jacobians, taken once and at the wrong place: "
             f"with Jacobians from the truth the same filter has {_times(ideal.excess)}."
         )
+    elif max(ekf.excess, graph.excess) <= attained and (found.singular_values == 0).any():
+        out.append("Verdict: observability. Both attain it, and what cannot be seen stays as uncertain as the prior.")
     elif max(ekf.excess, graph.excess) <= attained:
         out.append("Verdict: both attain it; nothing is wrong.")
     else:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from piazzi.evaluate.window_trade import WindowTrade
 
+_SAME = 1.0001  # times the best error that is no difference
 _ENOUGH = 1.05  # times the best error that is as good as the best
 
 
@@ -47,7 +48,7 @@ def sentences(trade: WindowTrade) -> list[str]:
             best = float(np.nanmin(errors))
             out.append(
                 f"{name}, the smallest {group} error of the last half is {number(best * show.factor)}{show.suffix} (RMS), with "
-                f"{_states(int(trade.lags[np.nanargmin(errors)]))}; {_enough(trade.lags, errors, best)}."
+                f"{_states(int(trade.lags[np.flatnonzero(errors <= _SAME * best)[0]]))}; {_enough(trade.lags, errors, best)}."
             )
     return out
 
