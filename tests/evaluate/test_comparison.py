@@ -270,3 +270,28 @@ def test_what_a_gate_rejected_is_told(good):
     assert "rejected" not in plain
     assert row["rejected"] == 3
     assert f"The gate of gated rejected 3 of {len(good.tracking.row_times)} measurements." in str(comparison)
+
+
+def test_outliers_and_modes_are_told(good):
+    weights = np.ones(len(good.innovations))
+    weights[:2] = 0.05
+    modes = [{"probability": 0.75, "cost": 3.0}, {"probability": 0.25, "cost": 4.0}]
+    comparison = compared(
+        plain=good,
+        robust=replace(good, details={"weights": weights}),
+        bank=replace(good, details={"modes": modes}),
+        sure=replace(good, details={"modes": modes[:1]}),
+    )
+    plain, robust, bank, _ = comparison.to_dict()["rows"]
+    assert not {"outliers", "modes"} & plain.keys()
+    assert robust["outliers"] == 2
+    assert bank["modes"] == modes
+    text = str(comparison)
+    assert f"robust took 2 of {len(good.tracking.row_times)} measurements for outliers." in text
+    assert "bank found 2 solutions, with probabilities 75 % and 25 %." in text
+    assert "sure found" not in text
+    for first, second in (("robust", "plain"), ("plain", "robust")):
+        estimates = {"plain": good, "robust": replace(good, details={"weights": weights})}
+        found = compared(**{first: estimates[first], second: estimates[second]}).to_dataset()["outliers"].values
+        assert sorted(found.tolist(), key=np.isnan)[0] == 2
+        assert np.isnan(found).sum() == 1

@@ -79,4 +79,4 @@ def write(path: str, comparison: Comparison) -> None:
     if path == output.STDOUT or path.lower().endswith(".json"):
         output.write_json(path, document)
     else:
-        output.write_csv(path, document["rows"])
+        output.write_csv(path, [{k: v for k, v in row.items() if not isinstance(v, list)} for row in document["rows"]])

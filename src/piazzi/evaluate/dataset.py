@@ -82,8 +82,8 @@ def _numbers(problem: Problem, rows: Sequence[Row]) -> list[tuple[str, Array, di
     """Every number of the rows by the name that it has in JSON, NaN where it is not known, with its unit."""
     records = [row.to_dict() for row in rows]
     out: list[tuple[str, Array, dict[str, str]]] = []
-    for key in records[0] if records else ():
-        values = [record[key] for record in records]
+    for key in dict.fromkeys(key for record in records for key in record):
+        values = [record.get(key) for record in records]
         if all(v is None or isinstance(v, bool | int | float) for v in values):
             if not any(v is None for v in values) and isinstance(values[0], bool):
                 out.append((key, np.array(values, dtype=bool), {}))

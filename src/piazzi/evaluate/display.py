@@ -194,7 +194,7 @@ def sentences(comparison: Comparison) -> list[str]:
     out = [f"{r.estimator} did not succeed: {r.message}." for r in comparison.rows if not r.success]
     wayward = dict.fromkeys(r.estimator for r in comparison.rows if r.success and r.diverged)
     out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down." for name in wayward]
-    out += _rejected(comparison)
+    out += [*_rejected(comparison), *_modes(comparison)]
     if any(v is not None for r in sound for v in r.rmse.values()):
         out += [*_best(comparison, sound), *_honest(comparison, sound)]
     elif sound:
@@ -221,7 +221,20 @@ def _rejected(comparison: Comparison) -> list[str]:
     """How many rows each gate left out."""
     total = len(comparison.tracking.row_times)
     counts = {r.estimator: r.rejected for r in comparison.rows if r.rejected is not None}
-    return [f"The gate of {name} rejected {count:,} of {total:,} measurements." for name, count in counts.items()]
+    out = [f"The gate of {name} rejected {count:,} of {total:,} measurements." for name, count in counts.items()]
+    counts = {r.estimator: r.outliers for r in comparison.rows if r.outliers is not None}
+    return out + [f"{name} took {count:,} of {total:,} measurements for outliers." for name, count in counts.items()]
+
+
+def _modes(comparison: Comparison) -> list[str]:
+    """How probable each of several solutions is."""
+    out = []
+    for row in comparison.rows:
+        if row.modes and len(row.modes) > 1:
+            shares = [f"{100 * mode['probability']:.3g} %" for mode in row.modes[:4]]
+            more = f" and {len(row.modes) - 4} more" if len(row.modes) > 4 else ""
+            out.append(f"{row.estimator} found {len(row.modes)} solutions, with probabilities {_list(shares)}{more}.")
+    return out
 
 
 def _without_truth(comparison: Comparison, rows: Sequence[Row]) -> list[str]:

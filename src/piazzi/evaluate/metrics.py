@@ -112,6 +112,12 @@ def used(estimate: Estimate) -> Array:
     return measured
 
 
+def outliers(estimate: Estimate) -> int | None:
+    """How many rows a loss gave hardly any weight, None where there is no loss."""
+    weights = estimate.details.get("weights")
+    return None if weights is None else int((np.asarray(weights) < _OUTLIER).sum())
+
+
 def squared_in_sigmas(e: Array, P: Array, present: Array) -> Consistency:
     """e^T P^-1 e for vectors (K, n) and covariances (K, n, n), over the components that are `present`, (K, n).
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +12,7 @@ from piazzi.estimate import Estimate
 from piazzi.evaluate.bounds import Bounds
 from piazzi.evaluate.consistency import Check
 from piazzi.evaluate.honesty import Honesty, judged
-from piazzi.evaluate.metrics import convergence_time, diverged, groups, known_truth, nis, rmse, squared_in_sigmas
+from piazzi.evaluate.metrics import convergence_time, diverged, groups, known_truth, nis, outliers, rmse, squared_in_sigmas
 from piazzi.evaluate.quantities import finite
 
 _ALWAYS = ("position", "velocity")  # groups that every row has, None where the model does not name them
@@ -33,6 +33,8 @@ class Row:
         half's
     diverged : see `piazzi.evaluate.has_diverged`
     rejected : rows of measurements that a gate left out; None, and no part of the dictionary, where there is no gate
+    outliers : rows to which a loss gave hardly any weight; likewise
+    modes : the solutions that a bank of starts found, with "probability", "cost" and first "state"; likewise
     """
 
     estimator: str
@@ -52,6 +54,8 @@ class Row:
     convergence_time: float | None = None
     honesty: Honesty = field(default_factory=Honesty)
     rejected: int | None = None
+    outliers: int | None = None
+    modes: Sequence[Mapping[str, Any]] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The row in the contract's names, numbers that are not finite as None."""
@@ -66,7 +70,8 @@ class Row:
         out |= {f"{g}_crlb_last_half": finite(self.crlb_last_half.get(g)) for g in names}
         out["convergence_time"] = finite(self.convergence_time)
         out |= _tests(self.honesty)
-        return out if self.rejected is None else out | {"rejected": self.rejected}
+        extra = {k: getattr(self, k) for k in ("rejected", "outliers", "modes")}
+        return out | {k: v for k, v in extra.items() if v is not None}
 
 
 def _tests(found: Honesty) -> dict[str, float | None]:
@@ -123,6 +128,8 @@ def evaluate(name: str, estimate: Estimate, bounds: Bounds | None = None, *, tho
         else convergence_time(error, next(iter(columns.values())), estimate.times),
         honesty=judged(estimate, consistency) if thorough else Honesty(),
         rejected=estimate.details.get("rejected_count"),
+        outliers=outliers(estimate),
+        modes=estimate.details.get("modes"),
     )
 
 
