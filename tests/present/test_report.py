@@ -106,6 +106,17 @@ def test_thinning_keeps_every_spike_and_the_order(count, seed):
         assert np.abs(moved).max() < thin.size
 
 
+def test_samples_are_typical_and_keep_what_is_wild():
+    values = np.random.default_rng(0).standard_normal(100_000)
+    values[54_321] = -30.0
+    shown = Thinning(100_000).sample(values, np.full(100_000, 6.0))
+    assert len(shown) == len(Thinning(100_000).places)
+    assert (shown == -30.0).sum() == 1
+    assert np.isin(shown, values).all()
+    assert np.std(shown[shown > -30.0]) == pytest.approx(1.0, abs=0.1)  # 3.9 standard deviations of a sample of 1500
+    assert (Thinning(10).sample(values[:10], np.zeros(10)) == values[:10]).all()
+
+
 def test_thinning_leaves_out_what_is_not_finite():
     values = np.full(10_000, np.nan)
     values[5000], values[5001] = 3.0, np.inf

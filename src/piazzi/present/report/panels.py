@@ -9,7 +9,7 @@ import numpy as np
 from piazzi.estimate import Estimate
 from piazzi.evaluate.metrics import groups
 from piazzi.evaluate.quantities import Display, display_of, unit_of
-from piazzi.present.colours import DASHES, OTHER
+from piazzi.present.colours import DASHES
 from piazzi.present.figures.measured import component_of
 from piazzi.present.report.blocks import Axis, Chart, Line
 from piazzi.present.report.thinning import Thinning
@@ -18,9 +18,11 @@ from piazzi.present.squares import Squares, nees_of, nis_of
 from piazzi.problem.checks import Array
 
 Shown = Array | tuple[Array, ...]  # what a page is given for a line
+INK = "var(--ink)"  # the colour of letters, in light and in dark
 _WORDS = {"realtime": "real time", "delayed": "delayed"}
 SIGMAS = 3.0
 _MOST_STATIONS = 6
+_WILD = 4.5  # sigmas from which an innovation is always drawn: one in 150,000 where the model holds
 _BENT = 30.0  # a scale is logarithmic where values span more than this factor
 
 
@@ -59,7 +61,7 @@ def _best_possible(views: Views, columns: Sequence[int]) -> list[Line]:
         variances = np.diagonal(views.bounds.of(view), axis1=1, axis2=2)[:, list(columns)]
         label = f"best possible{', ' + _WORDS[view] if len(kinds) > 1 else ''} (Cramer-Rao)"
         values = views.thin.extremes(np.sqrt(np.maximum(variances.sum(axis=1), 0.0)))
-        out.append(Line(views.times, values, label, colour=OTHER, dash=DASHES[2 if view == "realtime" else 3]))
+        out.append(Line(views.times, values, label, colour=INK, dash=DASHES[2 if view == "realtime" else 3]))
     return out
 
 
@@ -146,11 +148,12 @@ def innovations(views: Views) -> list[Chart]:
                 thin = Thinning(len(rows))
                 times = thin.at_places(views.comparison.tracking.row_times[rows])
                 bands.append(Line(times, thin.extremes(sigma[rows]), f"3 sigma{station}", key, "band", SIGMAS))
-                points.append(Line(times, thin.extremes(nu[rows]), f"innovation{station}", key, "points"))
+                points.append(Line(times, thin.sample(nu[rows], _WILD * sigma[rows]), f"innovation{station}", key, "points"))
         half = max(ends) or 1.0
         show = display_of(unit, [half / 1.6])
         y = Axis(f"innovation of {name}", show, low=-half, high=half)
-        note = views.note(Thinning(max(len(rows) for _, rows in parts)))
+        size = max(Thinning(len(rows)).size for _, rows in parts)
+        note = f"Two of every {size:,} are drawn, and what is beyond {_WILD:g} sigma." if size > 1 else ""
         out.append(Chart(f"Innovations of {name}", views.axis, y, [*bands, *points], single=True, note=note))
     return out
 

@@ -36,6 +36,19 @@ class Thinning:
         """The values where they belong."""
         return values[self.places]
 
+    def sample(self, values: Array, bound: Array) -> Array:
+        """The values where they belong, but in a bucket with any beyond the bound the largest in its place."""
+        shown = values[self.places]
+        if self.size == 1:
+            return shown
+        with np.errstate(invalid="ignore", divide="ignore"):
+            excess = np.nan_to_num(np.abs(values) / bound, nan=0.0, posinf=0.0)
+        starts = np.arange(0, self.count, self.size)
+        for bucket in np.flatnonzero(np.maximum.reduceat(excess, starts) > 1.0).tolist():
+            part = slice(starts[bucket], starts[bucket] + self.size)
+            shown[np.searchsorted(self.places, starts[bucket])] = values[part][np.argmax(excess[part])]
+        return shown
+
     def extremes(self, values: Array) -> Array:
         """The smallest and the largest of every bucket, in the order in which they came; NaN where a bucket has none."""
         if self.size == 1:
