@@ -227,8 +227,8 @@ def test_another_station_sees_more_and_can_end_the_twin():
     assert (found.added.crlb_sigma < found.crlb_sigma).all()
     assert found.added.attempts == ()
     assert found.twins
-    bearing = pz.Sensor("bearing", ["atan2(y, x)"], angles=("bearing",))
-    with_angle = pz.observability(problem, tracking, add=[(bearing, pz.Station("eye", "bearing", 1e-4))])
+    eye = pz.Sensor("eye", {"eye": "atan2(y - a, x)"}, angles=("eye",))
+    with_angle = pz.observability(problem, tracking, add=[(eye, pz.Station("eye", "eye", 1e-4, {"a": 1.0}))])
     assert with_angle.added.twins == ()
     with pytest.raises(ValueError, match="two stations are called 'radar'"):
         pz.observability(problem, tracking, add=[pz.Station("radar", "range", 0.01, {"mx": 0.0, "my": 10.0})])
