@@ -159,3 +159,17 @@ def test_a_refused_time_leaves_the_epoch_open(two_radars, monkeypatch):
                 live.predict(t - 0.01)
         live.update(str(name), z, t)
     assert_array_equal(live.mean, whole.mean[-1])
+
+
+@pytest.mark.parametrize(
+    "estimator", [pz.ExtendedKalmanFilter(), pz.ExtendedKalmanFilter(gate=0.999), pz.UnscentedKalmanFilter()]
+)
+def test_a_measurement_before_any_prediction_is_at_the_time_of_the_prior(estimator, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x"], ["0"], [pz.Sensor("ramp", ["x + 0.1*t"])])
+    problem = pz.Problem(model, pz.Gaussian(1.0, 1.0), None, [pz.Station("here", "ramp", 0.01)], prior_time=5.0)
+    live = estimator.start(problem)
+    live.update("here", 1.7)
+    whole = estimator.estimate(problem, pz.Tracking([5.0], [1.7]))
+    assert_allclose(live.mean, whole.mean[0], rtol=1e-12)
+    assert_allclose(live.mean, [1.0 + 0.2 / 1.01], rtol=1e-9)

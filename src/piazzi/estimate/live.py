@@ -113,6 +113,7 @@ class LiveFilter:
         self._d, self._P = np.zeros(n), problem.covariance.copy()
         self.innovation, self.innovation_covariance = np.full(m, np.nan), np.full((m, m), np.nan)
         self._times, self._count, self._which = np.zeros(4), np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+        self._times[3] = problem.prior_time or 0.0  # measurements before any prediction are at the time of the prior
         self._row, self._predicted_to, self._measured = np.full(m, np.nan), problem.prior_time, False
         library = kernels.load(problem.spec("transition", problem.noise_fragment, *fragments, "filter_live"))
         self._predict = library.live_predict.bind(
