@@ -21,6 +21,7 @@ ROUNDS = 5
 
 def figures() -> Iterator[Figure]:
     yield from _ekf()
+    yield from _flat("window of 10", pz.SlidingWindow(lag=10), {K: long_runs(K)[0] for K in (10**4, 10**5)}, 1.2)
     yield from _graph()
 
 

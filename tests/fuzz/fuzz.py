@@ -33,14 +33,25 @@ WORDS = {
     "numbers": "0 -0.0 1e999 -1e308 nan inf 1e-320 0x10 1_0 true 1e --1 . -1 111111111111111111111111111",
     "scenario": '[ ] [[ ]] { } = , " """ \' # . x vx length length/time units km sigma variance covariance state truth '
     "role mean estimated ** atan2( __import__('os') é \\u0000 1979-05-27 9**9**9**9 max_step list method adaptive runge-kutta "
-    "kepler delta_v",
+    "kepler delta_v time_constant study",
     "csv": '" , ,, # time station west truth:x [deg] [ é epoch',
     "npz": "descr fortran_order shape <f8 |O >f4 <U9 ( ) True .npy",
     "nc": "SNOD TREE HEAP OHDR FRHP BTHD problem about value",
 }
 MORE = {
     "numbers": ["9" * 400],
-    "scenario": ["\n", "\0", "[truth]\n", "[step]\n", "[memory]\n", "[[manoeuvres]]\n", "a." * 50, "[" * 2000, "(" * 2000],
+    "scenario": [
+        "\n",
+        "\0",
+        "[truth]\n",
+        "[step]\n",
+        "[memory]\n",
+        "[[manoeuvres]]\n",
+        "[gauss_markov]\n",
+        "a." * 50,
+        "[" * 2000,
+        "(" * 2000,
+    ],
     "csv": ["\n", "\r", "\r\n", "\0", "\ufeff", " ", "\t", "# epoch = x\n"],
     "npz": ["PK\x03\x04", "PK\x05\x06", "\x93NUMPY"],
     "nc": ["\x89HDF\r\n\x1a\n"],
