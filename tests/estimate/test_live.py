@@ -36,11 +36,20 @@ def test_the_window_gives_the_whole_run_bit_for_bit(bearings, lag, iterations):
     estimator = pz.SlidingWindow(lag=lag, iterations=iterations)
     whole = estimator.estimate(problem, tracking)
     live = estimator.start(problem)
+    with pytest.raises(ValueError, match="no state in the window yet"):
+        _ = live.oldest
     for k, t in enumerate(tracking.times[:200]):
         assert live.update(problem.stations[0].name, tracking.values[k], t)
         assert_array_equal(live.mean, whole.mean[k])
         assert_array_equal(live.covariance, whole.covariance[k])
+        if k >= lag - 1:  # it leaves at the next epoch
+            assert live.times[0] == tracking.times[k - lag + 1]
+            assert_array_equal(live.oldest.mean, whole.delayed.mean[k - lag + 1])
+            assert_array_equal(live.oldest.covariance, whole.delayed.covariance[k - lag + 1])
     assert len(live.times) == lag
+    again = estimator.start(problem)
+    again.restore(live.checkpoint())
+    assert_array_equal(again.oldest.covariance, live.oldest.covariance)
 
 
 @pytest.fixture

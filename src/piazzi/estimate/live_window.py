@@ -12,7 +12,7 @@ from piazzi.estimate.live import Clock, checked_measurement
 from piazzi.estimate.losses import Loss
 from piazzi.estimate.robust_window import row_space, window_fragments
 from piazzi.kernels.spec import lanes_for
-from piazzi.problem import Problem
+from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 
 
@@ -33,13 +33,14 @@ class LiveWindow:
     time : float or None, the newest epoch, s
     mean, covariance : (n,), (n, n), the newest state as known now; after `predict`, carried to its time
     times, means : (W,), (W, n), the states in the window
+    oldest : Gaussian, the first of them given all that the window knows: the delayed estimate, with its covariance
     refused : list of (time, station)
     innovation, innovation_covariance : of the last row taken in
     """
 
     saved_names = (
         *("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before"),
-        *("nu_lin", "H_lin", "dx", "mean", "covariance"),
+        *("nu_lin", "H_lin", "dx", "mean", "covariance", "oldest_covariance"),
     )
 
     def __init__(
@@ -75,6 +76,12 @@ class LiveWindow:
     @property
     def means(self) -> Array:
         return self._x.copy()
+
+    @property
+    def oldest(self) -> Gaussian:
+        if not len(self._t):
+            raise ValueError("there is no state in the window yet")
+        return Gaussian(self._x[0].copy(), self._late_covariance[0].copy())
 
     @property
     def innovation(self) -> Array:
@@ -300,6 +307,7 @@ class LiveWindow:
         W, J, m = len(self._t), len(self._z), self.problem.model.width
         if self._capacity[0]:
             out |= {"nu_lin": self._nu_lin[: J * m].copy(), "H_lin": self._H_lin[: J * m].copy(), "dx": self._dx[:W].copy()}
+            out["oldest_covariance"] = self._late_covariance[0].copy()
         return out | {
             "mean": self.mean.copy(),
             "covariance": self.covariance.copy(),
@@ -324,7 +332,7 @@ class LiveWindow:
             "station": (J,),
         }
         shapes |= {"x": (W, n), "x_before": (W, n), "mean": (n,), "covariance": (n, n)}
-        shapes |= {"nu_lin": (J * m,), "H_lin": (J * m, n), "dx": (W, n)} if W else {}
+        shapes |= {"nu_lin": (J * m,), "H_lin": (J * m, n), "dx": (W, n), "oldest_covariance": (n, n)} if W else {}
         for name, shape in shapes.items():
             if name not in saved or np.shape(saved[name]) != shape:
                 found = np.shape(saved.get(name, ()))
@@ -342,6 +350,7 @@ class LiveWindow:
         if W:
             self._buffers()
             self._nu_lin[: J * m], self._H_lin[: J * m], self._dx[:W] = saved["nu_lin"], saved["H_lin"], saved["dx"]
+            self._late_covariance[0] = saved["oldest_covariance"]
 
 
 _KEPT = ("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before")
