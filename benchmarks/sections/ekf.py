@@ -13,7 +13,7 @@ from figures import Figure, interleaved
 import piazzi as pz
 
 REPEATS = 40
-BOUND = 2.0
+BOUND = 1.25
 
 
 def figures() -> Iterator[Figure]:

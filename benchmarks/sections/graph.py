@@ -10,7 +10,7 @@ from figures import Figure, interleaved, rounds
 import piazzi as pz
 
 REPEATS = 20
-BOUND = 4.0
+BOUND = 2.0
 
 
 def figures() -> Iterator[Figure]:

@@ -10,7 +10,7 @@ from figures import Figure, interleaved
 import piazzi as pz
 
 REPEATS = {10: 15, 50: 9, 100: 7, 200: 5}
-BOUND = 3.5
+BOUND = 2.0
 
 
 def figures() -> Iterator[Figure]:

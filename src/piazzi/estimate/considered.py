@@ -36,7 +36,7 @@ def with_considered(run: Run[_Estimator]) -> Run[_Estimator]:
     def estimate(self: _Estimator, problem: Problem, tracking: Tracking) -> Estimate:
         names = considered_names(problem)
         nominal = run(self, problem, tracking)
-        for name in names if nominal.success else ():
+        for name in names if names and nominal.success else ():  # only where there are any: the check takes time
             sides = [run(self, moved(problem, name, side * STEP), tracking) for side in (1.0, -1.0)]
             nominal = _inflated(nominal, name, *sides)
         return nominal
