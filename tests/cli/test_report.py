@@ -43,6 +43,13 @@ def test_windows_and_observability_write_reports_and_join_one(call, tmp_path):
     assert "whole numbers" in call("report", "b612-range", "--windows", "few", "-o", tmp_path / "x.html").refused()
 
 
+def test_a_warning_of_long_steps_is_on_the_page(call, data_dir, tmp_path):
+    page = tmp_path / "page.html"
+    found = call("report", data_dir / "satellite" / "slide_example.npz", "--with", "ekf", "-o", page)
+    assert "steps are too long" in found.err
+    assert "Beware" in page.read_text() and "steps are too long" in page.read_text()
+
+
 def test_bad_places_and_sources_are_refused(call, tmp_path):
     assert "must end in .html" in call("report", "b612-range", "-o", tmp_path / "page.pdf").refused()
     assert "goes into a file" in call("report", "b612-range", "-o", "-").refused()

@@ -50,11 +50,11 @@ def command(
     estimators = options.parsed(names, DEFAULT)
     from piazzi.cli.comparing import run_comparison
 
-    source_name, comparison = run_comparison(source, estimators, seed, scenario, bar=report is not None)
+    source_name, comparison, warning = run_comparison(source, estimators, seed, scenario, bar=report is not None)
     if output_file is not None:
         write(output_file, comparison)
     if report is not None:
-        report = write_report(report, comparison, *reporting.titled(source, source_name, scenario))
+        report = write_report(report, comparison, warning, *reporting.titled(source, source_name, scenario))
     if as_json:
         if output_file != output.STDOUT:
             output.print_json(comparison.to_dict())
@@ -66,11 +66,11 @@ def command(
     return DONE if comparison.success else NOT_ESTIMATED
 
 
-def write_report(folder: str, comparison: Comparison, title: str, planet_radius: float | None) -> str:
+def write_report(folder: str, comparison: Comparison, warning: str, title: str, planet_radius: float | None) -> str:
     """Write the page of a comparison; returns its path."""
     from piazzi.present.report import comparison_tab
 
-    return str(reporting.write(folder, [comparison_tab(comparison, title=title, planet_radius=planet_radius)]))
+    return str(reporting.write(folder, [comparison_tab(comparison, title=title, planet_radius=planet_radius, warning=warning)]))
 
 
 def write(path: str, comparison: Comparison) -> None:

@@ -24,22 +24,25 @@ def run_comparison(
     *,
     bar: bool = False,
     thorough: bool = True,
-) -> tuple[str, Comparison]:
-    """The source's name and the comparison of these estimators on it; raises as `piazzi.loading` and `piazzi.compare` do.
+) -> tuple[str, Comparison, str]:
+    """The source's name, the comparison of these estimators on it, and a warning of long steps, "" for none.
 
-    A bar of progress is shown for long runs, and where it is asked for; `thorough` is for `compare`.
+    Raises as `piazzi.loading` and `piazzi.compare` do.  A bar of progress is shown for long runs, and where it is asked for;
+    `thorough` is for `compare`.
     """
     from piazzi.evaluate import compare
 
     found = load_source(source, seed, scenario)
     with output.progress(len(estimators), long=bar or len(found.tracking.times) * len(estimators) > _LONG) as step:
         comparison = compare(found.problem, found.tracking, estimators, source=found.name, announce=step, thorough=thorough)
-    _warn_of_steps(found, comparison, estimators)
-    return found.name, comparison
+    warning = _warning_of_steps(found, comparison, estimators)
+    if warning:
+        say(f"warning: {found.name}: {warning}")
+    return found.name, comparison, warning
 
 
-def _warn_of_steps(found: Source, comparison: Comparison, estimators: Mapping[str, Estimator]) -> None:
-    """One line on stderr where the steps are long beside the noise, unless the truth was simulated with the same steps.
+def _warning_of_steps(found: Source, comparison: Comparison, estimators: Mapping[str, Estimator]) -> str:
+    """What to say where the steps are long beside the noise, unless the truth was simulated with the same steps.
 
     Judged by an estimator whose kernel this run has compiled anyway: the filter, where it or a graph (which starts from it)
     is asked for, else the first that gives states in real time.
@@ -50,14 +53,12 @@ def _warn_of_steps(found: Source, comparison: Comparison, estimators: Mapping[st
 
     truth = found.problem.truth
     if not found.recorded and (truth is None or truth.integrator is None):
-        return
+        return ""
     used = [estimators[name] for name, estimate in comparison.estimates.items() if estimate.success]
     plain = ExtendedKalmanFilter()
     if not any(e == plain or isinstance(e, FactorGraph) for e in used):
         used = [e for e in used if "realtime" in views_of(e)]
         if not used:
-            return
+            return ""
         plain = used[0]  # type: ignore[assignment]
-    text = step_warning(found.problem, found.tracking, estimator=plain)
-    if text:
-        say(f"warning: {found.name}: {text}")
+    return step_warning(found.problem, found.tracking, estimator=plain)

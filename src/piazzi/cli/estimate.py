@@ -73,7 +73,7 @@ def command(
         times_ahead(ahead, 0.0)  # what cannot be read is told before anything is computed
     from piazzi.cli.comparing import run_comparison
 
-    source_name, comparison = run_comparison(source, estimators, seed, scenario, thorough=False)
+    source_name, comparison, _ = run_comparison(source, estimators, seed, scenario, thorough=False)
     forecasts = {} if ahead is None else predicted(comparison, ahead)
     document = to_dict(comparison, forecasts)
     if output_file is not None:

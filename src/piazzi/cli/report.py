@@ -61,12 +61,12 @@ def command(
 
     tabs, success = [], True
     for source in sources:
-        name, comparison = run_comparison(
+        name, comparison, warning = run_comparison(
             source, estimators, seed, scenario if source.lower().endswith(".csv") else None, bar=True
         )
         title, radius = reporting.titled(source, name, scenario)
         more, well = _more(comparison, lags, seen)
-        tabs.append(comparison_tab(comparison, title=title, planet_radius=radius, more=more))
+        tabs.append(comparison_tab(comparison, title=title, planet_radius=radius, more=more, warning=warning))
         success &= comparison.success and well
     wrote = reporting.write(output_file, tabs)
     output.print_rich(f"Wrote {wrote}: open it in a browser.")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from piazzi.evaluate import Comparison
 from piazzi.evaluate.display import columns
 from piazzi.present.figures.style import time_display
-from piazzi.present.report.blocks import Now, Section, Tab, Table, Text
+from piazzi.present.report.blocks import Now, Point, Section, Tab, Table, Text
 from piazzi.present.report.panels import consistency, group_charts, innovations, state_charts
 from piazzi.present.report.paths import orbits
 from piazzi.present.report.views import Views
@@ -26,7 +26,12 @@ _NO_NEES = " NEES needs the truth, which is not known here."
 
 
 def comparison_tab(
-    comparison: Comparison, *, title: str = "", planet_radius: float | None = None, more: Sequence[Section] = ()
+    comparison: Comparison,
+    *,
+    title: str = "",
+    planet_radius: float | None = None,
+    more: Sequence[Section] = (),
+    warning: str = "",
 ) -> Tab:
     """Summary, orbit, errors, consistency and table of a comparison.
 
@@ -36,13 +41,14 @@ def comparison_tab(
     title : by default its source
     planet_radius : m, drawn to scale about the origin
     more : sections to put before the table, such as a window trade
+    warning : of the problem itself, such as of long steps; "" for none
     """
     views = Views.of(comparison)
     sections = [*_sections(views, planet_radius)] if views.found else []
     return Tab(
         title or comparison.source or "Comparison",
         summary(comparison.problem, comparison.tracking, comparison.source or "measurements"),
-        points(comparison),
+        [*points(comparison), *([Point("Beware", f"{warning[:1].upper()}{warning[1:]}.", "bad")] if warning else [])],
         [*sections, *more, _table(comparison, views), _reading()],
         keys=views.keys,
         times=views.times if views.found else None,
