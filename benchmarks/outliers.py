@@ -60,12 +60,12 @@ def main() -> None:
             errors[name].append(position_error(estimator.estimate(problem, bad if outliers else clean)))
     reference = float(np.median(errors["graph, clean"]))
     print(f"{options.source}, {options.seeds} seeds, {100 * SHARE:g} % of the bearings uniform; position error, km")
-    print(f"{'':22s}{'median':>10s}{'ratio':>8s}{'mean':>12s}{'largest':>12s}{'failed':>8s}")
+    print(f"{'':22s}{'median':>14s}{'ratio':>14s}{'mean':>12s}{'largest':>12s}{'failed':>8s}")
     for name, found in errors.items():
         e = np.array(found)
         there = e[np.isfinite(e)]
         figures = (
-            f"{np.median(e) / 1e3:10.2f}{np.median(e) / reference:8.3f}{there.mean() / 1e3:12.4g}{there.max() / 1e3:12.4g}"
+            f"{np.median(e) / 1e3:14.2f}{np.median(e) / reference:14.3f}{there.mean() / 1e3:12.4g}{there.max() / 1e3:12.4g}"
         )
         print(f"{name:22s}{figures}{len(e) - len(there):8d}")
 
