@@ -47,7 +47,9 @@ def case(estimated: bool) -> tuple[pz.Problem, pz.Tracking]:
             parameters.append(pz.Parameter(f"{axis}{name}", "estimated" if estimated else "fixed"))
             values[f"{axis}{name}"] = pz.Gaussian(value, 1.0) if estimated else value
         sensors.append(pz.Sensor(name, [f"sqrt((x - x{name})**2 + (y - y{name})**2 + (z - z{name})**2)"]))
-    model = pz.Model(["x", "y", "z", "vx", "vy", "vz"], ["vx", "vy", "vz", *(f"-{q}{pull}" for q in "xyz")], sensors, parameters)
+    model = pz.Model(
+        ["x", "y", "z", "vx", "vy", "vz"], ["vx", "vy", "vz", *(f"-{q}{pull}" for q in "xyz")], sensors, parameters
+    )
     problem = pz.Problem(
         model,
         pz.Gaussian.from_sigma([7e6, 0, 0, 0, 5e3, 5.5e3], [100.0] * 3 + [0.1] * 3),

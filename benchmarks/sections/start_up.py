@@ -31,7 +31,10 @@ def figures() -> Iterator[Figure]:
         once = {"PIAZZI_CACHE": empty}
         yield Figure("piazzi estimate, cold", _cpu(estimate, once, repeats=1), "s CPU", bound=15.0, note="nothing compiled yet")
         yield Figure("piazzi estimate, warm", _cpu(estimate, once), "s CPU", bound=1.0)
-        run = ["-c", f"import sys; from piazzi.cli.main import main; sys.argv = {['piazzi', *estimate[len(program) :]]!r}; main()"]
+        run = [
+            "-c",
+            f"import sys; from piazzi.cli.main import main; sys.argv = {['piazzi', *estimate[len(program) :]]!r}; main()",
+        ]
         for name, seconds in _imports([python, "-X", "importtime", *run], once):
             yield Figure(f"  of it importing {name}", seconds, "s", note="wall clock, slowed by being watched")
 

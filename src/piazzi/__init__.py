@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from piazzi.loading import load
     from piazzi.model import Model, Parameter, Sensor
     from piazzi.orbit import kepler_transition, propagate_kepler
+    from piazzi.present.report import write_report
     from piazzi.problem import (
         Gaussian,
         Manoeuvre,
@@ -81,6 +82,7 @@ _WHERE = {
     **dict.fromkeys(("Study", "read_store"), "piazzi.study"),
     "simulate": "piazzi.simulation",
     "load": "piazzi.loading",
+    "write_report": "piazzi.present.report",
 }
 
 __version__ = "0.1.0"
@@ -144,6 +146,7 @@ __all__ = [
     "update",
     "windows",
     "with_gauss_markov",
+    "write_report",
 ]
 
 

@@ -196,6 +196,14 @@ def test_pages_are_written_whole_into_a_folder(tmp_path):
         write_page(tmp_path / "nowhere" / "x.html", "T", [tab])
 
 
+def test_a_report_from_python(comparison, tmp_path):
+    path = pz.write_report(tmp_path, comparison, comparison, title="Both")
+    assert path == tmp_path / "report.html"
+    assert len(data_of(path.read_text())["tabs"]) == 2
+    with pytest.raises(ValueError, match="no comparison"):
+        pz.write_report(tmp_path)
+
+
 def test_a_lost_estimate_leaves_gaps(comparison):
     ekf = comparison.estimates["ekf"]
     mean, P = ekf.mean.copy(), ekf.covariance.copy()

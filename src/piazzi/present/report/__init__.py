@@ -19,7 +19,7 @@ from piazzi.present.report.observability import observability_section, observabi
 from piazzi.present.report.page import page
 from piazzi.present.report.study import study_tabs
 from piazzi.present.report.windows import windows_section, windows_tab
-from piazzi.present.report.write import write_page
+from piazzi.present.report.write import write_page, write_report
 
 __all__ = [
     "Axis",
@@ -42,4 +42,5 @@ __all__ = [
     "windows_section",
     "windows_tab",
     "write_page",
+    "write_report",
 ]

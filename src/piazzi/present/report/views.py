@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from piazzi.estimate import Estimate
 from piazzi.evaluate import Comparison
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
+from piazzi.evaluate.honesty import LONGEST
 from piazzi.evaluate.metrics import known_truth
 from piazzi.evaluate.quantities import Display
 from piazzi.present.colours import dash_of, label_of, shades
@@ -49,7 +50,7 @@ class Views:
         keys = tuple(Key(label_of(name, view), colours[name], dash_of(name, view, names)) for name, view in found)
         truth = known_truth(next(iter(found.values()))) if found else None
         thin = Thinning(len(times))
-        bounded = any(row.crlb for row in comparison.rows)
+        bounded = any(row.crlb for row in comparison.rows) and len(times) <= LONGEST
         bounds = posterior_bounds(comparison.problem, comparison.tracking) if bounded else None
         return cls(comparison, found, keys, truth, thin, thin.at_places(times), time_display(times), bounds)
 

@@ -6,8 +6,10 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from piazzi.evaluate import Comparison
 from piazzi.io.atomic import atomic_path
 from piazzi.present.report.blocks import Tab
+from piazzi.present.report.comparison import comparison_tab
 from piazzi.present.report.page import page
 
 NAME = "report.html"
@@ -25,6 +27,30 @@ def write_page(path: str | os.PathLike[str], title: str, tabs: Sequence[Tab], *,
     with atomic_path(target) as work:
         work.write_text(page(title, tabs, foot=foot), encoding="utf-8", newline="\n")
     return target
+
+
+def write_report(
+    path: str | os.PathLike[str], *comparisons: Comparison, title: str = "Piazzi report", planet_radius: float | None = None
+) -> Path:
+    """Write a page of comparisons, a tab for each; returns its path, which for a folder is report.html in it.
+
+    Parameters
+    ----------
+    path : a file that ends in .html, or a folder
+    comparisons : Comparison
+    title : of the page
+    planet_radius : m, drawn to scale about the origin
+
+    Raises
+    ------
+    ValueError
+        For no comparison.
+    OSError
+        Where it cannot be written.
+    """
+    if not comparisons:
+        raise ValueError("there is no comparison to report")
+    return write_page(path, title, [comparison_tab(c, planet_radius=planet_radius) for c in comparisons])
 
 
 def page_path(path: str | os.PathLike[str]) -> Path:
