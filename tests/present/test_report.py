@@ -185,6 +185,7 @@ def test_a_tab_can_be_anything():
         [Tab("Study", "two cases", [], [Section("Results", [table, Text(["It is <so>."])])], keys=[Key("a", "#123456")])],
     )
     assert "&lt;b&gt;one&lt;/b&gt;" in html and "It is &lt;so&gt;." in html
+    assert "Look closely" not in html  # where no chart shows one estimator alone
 
 
 def test_pages_are_written_whole_into_a_folder(tmp_path):

@@ -115,7 +115,9 @@ class _Builder:
         )
         everyone = '<button type="button" class="quiet everyone">Hide all</button>' if len(tab.keys) > 2 else ""
         options = "".join(f'<option value="{i}">{text(key.label)}</option>' for i, key in enumerate(tab.keys))
-        focus = f'<label class="focus">Look closely at <select>{options}</select></label>' if tab.keys else ""
+        blocks = [block for section in tab.sections for block in section.blocks]
+        close = any(isinstance(b, Orbit) or (isinstance(b, Chart) and b.single) for b in blocks)
+        focus = f'<label class="focus">Look closely at <select>{options}</select></label>' if tab.keys and close else ""
         again = '<button type="button" class="quiet unzoom" hidden>Whole run</button>'
         return (
             f'<div class="bar" role="group" aria-label="Time and estimators">'
