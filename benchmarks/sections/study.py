@@ -1,7 +1,8 @@
 """Monte Carlo: the filter over many runs in lanes, and a whole study of 10,000 runs, beside the C floor's vectorised filter.
 
-The study simulates, filters, scores and keeps every run; its CPU seconds are those of all processes, its memory the largest sum
-of what they share proportionally (PSS).  The floor filters recorded bearings with noise added, and keeps the last state only.
+The study simulates, filters, scores and keeps every run; its CPU seconds are those of all processes, its memory the sum of
+their peaks, though libraries that they share count once in each.  The floor filters recorded bearings with noise added, and
+keeps the last state only.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ FILTER_BOUND, STUDY_BOUND, MEMORY_BOUND, CORE_BOUND = 0.7, 0.3, 1.5, 1.7
 
 
 def figures() -> Iterator[Figure]:
-    if not Path("/proc/self/smaps_rollup").exists():
+    if not Path("/proc/self/status").exists():
         raise UnavailableError("memory of processes is read from /proc")
     c = _c_runs_per_second()
     yield _filter(c)
@@ -38,7 +39,9 @@ def figures() -> Iterator[Figure]:
         f"study of {STUDY_RUNS:,} EKF runs", STUDY_RUNS / one["cpu"], "runs/s", "higher",
         ratio=STUDY_RUNS / one["cpu"] / c, to="C filter", bound=STUDY_BOUND, note="per CPU second, all processes",
     )  # fmt: skip
-    yield Figure("  memory of all processes, 2 workers", two["memory"], "GB", bound=MEMORY_BOUND, note="largest sum of PSS")
+    yield Figure(
+        "  memory of all processes, 2 workers", two["memory"], "GB", bound=MEMORY_BOUND, note="sum of the peaks of all"
+    )
     yield Figure(
         "  second worker", STUDY_RUNS / two["wall"], "runs/s", "higher", ratio=one["wall"] / two["wall"], to="one worker",
         bound=CORE_BOUND, note=f"wall clock, from start to finished file; {load}",
@@ -87,21 +90,23 @@ def _cpu() -> float:
 
 
 class _Memory:
-    """The largest sum of the proportional set sizes of this process and its children, looked at twenty times a second."""
+    """The sum of the largest resident sizes that this process and its children had, looked at five times a second."""
 
     def __init__(self) -> None:
-        self._most, self._end = 0.0, threading.Event()
+        self._most: dict[int, float] = {}
+        self._end = threading.Event()
         self._thread = threading.Thread(target=self._look)
         self._thread.start()
 
     def stop(self) -> float:
         self._end.set()
         self._thread.join()
-        return self._most
+        return sum(self._most.values())
 
     def _look(self) -> None:
-        while not self._end.wait(0.05):
-            self._most = max(self._most, sum(map(_pss, [os.getpid(), *_children()])))
+        while not self._end.wait(0.2):
+            for pid in (os.getpid(), *_children()):
+                self._most[pid] = max(self._most.get(pid, 0.0), _peak(pid))
 
 
 def _children() -> list[int]:
@@ -114,9 +119,10 @@ def _children() -> list[int]:
     return [int(pid) for pid in found]
 
 
-def _pss(pid: int) -> float:
+def _peak(pid: int) -> float:
+    """Largest resident size so far, GB; 0 where the process is gone."""
     try:
-        lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     except OSError:
         return 0.0
-    return sum(float(line.split()[1]) for line in lines if line.startswith("Pss:")) * 1024 / 1e9
+    return sum(float(line.split()[1]) for line in lines if line.startswith("VmHWM:")) * 1024 / 1e9

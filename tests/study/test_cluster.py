@@ -110,7 +110,7 @@ def test_same_bits_through_a_cluster_started_here(tmp_path):
 @pytest.mark.slow
 def test_killed_worker_and_killed_scheduler(tmp_path):
     """A worker killed in the middle costs nothing; the scheduler, a clear error and a store that goes on."""
-    runs = ["--runs", 4000]
+    runs = ["--runs", 1500]
     whole = subprocess.run(study_program(*runs, "-o", tmp_path / "whole.nc"), capture_output=True, text=True)
     assert whole.returncode == 0, whole.stderr
     path = tmp_path / "s.nc"
@@ -127,7 +127,7 @@ def test_killed_worker_and_killed_scheduler(tmp_path):
     assert process.returncode == 2, err
     assert out == ""
     assert f"the scheduler at {address} is gone" in err.splitlines()[-1]
-    assert re.search(r"[\d,]+ of 4,000 runs are kept beside", err)
+    assert re.search(r"[\d,]+ of 1,500 runs are kept beside", err)
     again = subprocess.run(study_program(*runs, "-o", path, "--resume"), capture_output=True, text=True)
     assert again.returncode == 0, again.stderr
     assert same_results(tmp_path / "whole.nc", path) == []

@@ -174,7 +174,7 @@ def test_a_worker_killed_from_outside_takes_nothing_along(whole, tmp_path, monke
 @pytest.mark.slow
 def test_killed_at_ten_random_moments_and_resumed(tmp_path):
     """SIGKILL of the main process, ten times in one study, at moments from its start to its end."""
-    arguments = ["study", "b612-range", "--runs", "3000", "--with", "ekf", "--with", "window:10", "--workers", "1"]
+    arguments = ["study", "b612-range", "--runs", "1200", "--with", "ekf", "--with", "window:10", "--workers", "1"]
     command = [sys.executable, "-m", "piazzi", *arguments]
     started = time.monotonic()
     subprocess.run([*command, "-o", tmp_path / "whole.nc"], check=True, capture_output=True)
