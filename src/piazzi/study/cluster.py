@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 LOCAL = "local"
 CONNECT_SECONDS = 5  # a dead address fails within ten, however it is dead and with all imports
+COUNT_SECONDS = 2.0
 WORKERS_SECONDS = 30  # until a scheduler has its first worker
 _SAME = ("python", "piazzi", "numpy", "llvmlite", "numba")
 
@@ -52,6 +53,7 @@ class Cluster:
         self._study, self._here = pickle.dumps(study), fingerprint()
         self._futures: dict[str, tuple[Future, Task]] = {}
         self._done: SimpleQueue[str] = SimpleQueue()
+        self._slots, self._counted = 1, -COUNT_SECONDS
         self._cluster = _local(workers) if address == LOCAL else None
         self.address = self._cluster.scheduler_address if self._cluster else address
         try:
@@ -63,8 +65,14 @@ class Cluster:
 
     @property
     def slots(self) -> int:
-        """Threads of all workers there are now."""
-        return max(1, int(sum(self._client.nthreads().values())))
+        """Threads of all workers there are, asked for again every few seconds."""
+        if time.monotonic() > self._counted + COUNT_SECONDS:
+            try:
+                self._slots = max(1, int(sum(self._client.nthreads().values())))
+            except (OSError, TimeoutError):
+                self._gone()
+            self._counted = time.monotonic()
+        return self._slots
 
     def submit(self, task: Task) -> None:
         future = self._client.submit(_run, self._here, self._study, task, pure=False)
