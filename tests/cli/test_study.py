@@ -176,7 +176,7 @@ def test_interrupt_leaves_a_store_that_goes_on(tmp_path):
     out, err = process.communicate(timeout=30)
     assert process.returncode == 130
     assert out == ""
-    lines = [line for line in err.splitlines() if "compiling" not in line]
+    lines = [line for line in err.splitlines() if line and "compiling" not in line]
     assert lines[1].startswith("piazzi: ")
     assert "of 100,000 runs are kept beside" in lines[1]
     assert lines[2] == "piazzi: interrupted"
