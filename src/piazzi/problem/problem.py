@@ -20,6 +20,9 @@ from piazzi.problem.constants import with_station_constants
 from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
 from piazzi.problem.two_body import check_orbit_axes, check_two_body
 
+MOST_SPECS = 1000  # beyond so many, the memory of specifications starts anew
+_SPECS: dict[tuple[tuple[Any, ...], tuple[str, ...], int], KernelSpec] = {}
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -164,7 +167,7 @@ class Problem:
 
     def _lay_out(self) -> None:
         """Make the arrays now, so that no run has to."""
-        for name in ("mean", "covariance", "given"):
+        for name in ("mean", "covariance", "given", "narrowest", "_traits"):
             getattr(self, name)
         for name in ("sensor", "noise", "correlated", "numbers"):
             getattr(self, f"station_{name}")
@@ -203,6 +206,11 @@ class Problem:
         return np.array([names.index(s.sensor) for s in self.stations], dtype=np.int64)
 
     @cached_property
+    def narrowest(self) -> int:
+        """Components of the smallest sensor of any station, 0 where there is no station."""
+        return min((len(s.noise) for s in self.stations), default=0)
+
+    @cached_property
     def station_noise(self) -> Array:
         """R of each station, (S, M, M), unit variance where a sensor has fewer components."""
         M = self.model.width
@@ -233,16 +241,20 @@ class Problem:
     def spec(self, *fragments: str, lanes: int = 1) -> KernelSpec:
         """The compiled module with these fragments, for this model, integrator, kind of noise, and manoeuvres or none."""
         assert self.integrator is not None
-        spec = self._specs.get((fragments, lanes))
+        key = (self._traits, fragments, lanes)
+        spec = _SPECS.get(key)
         if spec is None:
-            spec = self._specs[fragments, lanes] = KernelSpec(
-                self.model, self.integrator.scheme, composed(self, fragments, lanes), lanes
-            )
+            if len(_SPECS) > MOST_SPECS:
+                _SPECS.clear()
+            spec = _SPECS[key] = KernelSpec(self.model, self.integrator.scheme, composed(self, fragments, lanes), lanes)
         return spec
 
     @cached_property
-    def _specs(self) -> dict[tuple[tuple[str, ...], int], KernelSpec]:
-        return {}
+    def _traits(self) -> tuple[Any, ...]:
+        """What the choice of fragments depends on: problems that share it share the specifications of their kernels."""
+        integrator, events = self.integrator, bool(self.manoeuvres)
+        assert integrator is not None
+        return self.model, type(integrator), integrator.scheme, events, self.process_noise.axes, self.noise_varies
 
     @property
     def noise_fragment(self) -> str:

@@ -171,7 +171,7 @@ class Tracking:
 
     def _check_widths(self, problem: Problem, index: Array) -> None:
         columns = self.values.shape[1]
-        if columns <= min([len(s.noise) for s in problem.stations]):
+        if columns <= problem.narrowest:
             return
         widths = np.array([len(s.noise) for s in problem.stations])
         beyond = np.arange(columns)[None, :] >= widths[index][:, None]
