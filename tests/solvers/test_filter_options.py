@@ -129,7 +129,7 @@ def test_iterating_pays_where_an_epoch_sees_all_that_it_is_nonlinear_in():
     """Range and bearing together, far sharper than the prediction: errors fall, and the covariance says so."""
     problem = two_radars((1e-4, 1e-4))
     errors, honesty = {1: [], 5: []}, {1: [], 5: []}
-    for seed in range(40):
+    for seed in range(15):
         tracking = pz.simulate(problem, np.arange(20.0), np.random.default_rng(seed))
         for iterations, found in errors.items():
             estimate = pz.ExtendedKalmanFilter(iterations=iterations).estimate(problem, tracking)
