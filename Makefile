@@ -21,13 +21,18 @@ unexport PYTHONPATH PYTHONHOME
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-slow test-all lint format bench constraints clean distclean
+.PHONY: help demo docs test test-slow test-all lint format bench constraints clean distclean
 
 help: ## list what can be made
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 
 demo: .venv/.package ## write figures, tables and data of a first run into demo/
 	@$(BIN)/piazzi demo -o demo
+
+docs: .venv/.docs .venv/.package ## build the documentation into build/docs, without a network and strictly
+	@PIAZZI_CACHE="$${PIAZZI_CACHE:-$(CURDIR)/.cache/tests}" $(BIN)/sphinx-build --quiet --fail-on-warning --jobs auto \
+		--doctree-dir .cache/doctrees docs build/docs
+	@echo "Open build/docs/index.html"
 
 test: .venv/.dev .venv/.package ## fast tests (ARGS='tests/test_structure.py -k upstream' narrows them)
 	@$(PYTEST) -m "not slow" $(ARGS)
@@ -52,12 +57,12 @@ bench: .venv/.bench .venv/.package ## time Piazzi against hand-written C and oth
 constraints: ## resolve every pin in constraints.txt anew
 	@echo "Resolving the newest versions that work together (a few minutes)"
 	@rm -rf .cache/pins && "$(PYTHON)" -m venv .cache/pins
-	@.cache/pins/bin/python -m pip -qq --no-input install --no-compile '.[dev,bench,cluster]'
+	@.cache/pins/bin/python -m pip -qq --no-input install --no-compile '.[dev,bench,cluster,docs]'
 	@{ sed -n '/^#/p' constraints.txt; .cache/pins/bin/python -m pip freeze --exclude piazzi | LC_ALL=C sort -f; } > .cache/pins.txt
 	@mv .cache/pins.txt constraints.txt && rm -rf .cache/pins
 
 clean: ## remove what was made, but keep .venv
-	@rm -rf .cache .hypothesis build demo dist
+	@rm -rf .cache .hypothesis build demo dist docs/*/made
 	@find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## remove .venv too
@@ -79,6 +84,12 @@ distclean: clean ## remove .venv too
 .venv/.dev: .venv/.runtime
 	@echo "Installing what its tests need"
 	@$(FETCH) '.[dev]'
+	@$(COMPILE)
+	@touch $@
+
+.venv/.docs: .venv/.runtime
+	@echo "Installing what its documentation needs"
+	@$(FETCH) '.[docs]'
 	@$(COMPILE)
 	@touch $@
 

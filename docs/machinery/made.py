@@ -1,0 +1,68 @@
+"""What the site shows and nobody writes: answers of the command line, and pictures that the tutorials' code makes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+from sphinx.application import Sphinx
+from sphinx.util import logging
+
+LOGGER = logging.getLogger(__name__)
+MARK = "<!-- every command -->"
+BLOCKS = Path(__file__).with_name("blocks.py")
+RUN = "import sys, pathlib; sys.path.insert(0, sys.argv[1]); import blocks; blocks.run(*map(pathlib.Path, sys.argv[2:]))"
+
+
+def commands(group: click.Group, before: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """The words of every command, those of groups first."""
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        words, command = (*before, name), group.get_command(context, name)
+        yield words
+        if isinstance(command, click.Group):
+            yield from commands(command, words)
+
+
+def help_pages() -> str:
+    """A section for the program and for each command, with what its `--help` says."""
+    from piazzi.cli.commands import piazzi
+
+    sections = []
+    for words in [(), *commands(piazzi)]:
+        line = [str(Path(sys.executable).with_name("piazzi")), *words, "--help"]
+        text = subprocess.run(line, capture_output=True, text=True, check=True, timeout=60).stdout
+        title = " ".join(["piazzi", *words])
+        sections.append(f"## {title}\n\n```text\n{text.rstrip()}\n```\n")
+    return "\n".join(sections)
+
+
+def fill(app: Sphinx, name: str, text: list[str]) -> None:
+    """Put the help pages where a page asks for them."""
+    if MARK in text[0]:
+        text[0] = text[0].replace(MARK, help_pages())
+
+
+def pictures(app: Sphinx) -> None:
+    """Run every page that shows a picture from a folder `made`, which is where its code saves it."""
+    running = []
+    for page in sorted(Path(app.srcdir).rglob("*.md")):
+        if "](made/" not in page.read_text(encoding="utf-8"):
+            continue
+        folder = page.parent / "made"
+        folder.mkdir(exist_ok=True)
+        command = [sys.executable, "-W", "error", "-c", RUN, str(BLOCKS.parent), str(page), str(folder)]
+        running.append((page, subprocess.Popen(command, stderr=subprocess.PIPE, text=True)))
+    for page, process in running:
+        _, told = process.communicate(timeout=600)
+        if process.returncode != 0:
+            LOGGER.warning("the code of %s fails:\n%s", page, told)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.connect("builder-inited", pictures)
+    app.connect("source-read", fill)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,85 @@
+"""The documentation's code runs and prints what the pages say; what its sentences say is in there."""
+
+import ast
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+sys.path.insert(0, str(DOCS / "machinery"))
+try:
+    import blocks
+finally:
+    sys.path.pop(0)
+
+PAGES = sorted(p for p in DOCS.rglob("*.md") if any(b.language in ("python", "console") for b in blocks.blocks(p.read_text())))
+
+
+@pytest.mark.parametrize("page", [pytest.param(p, id=p.stem) for p in PAGES])
+def test_the_code_of_a_page_runs_and_gives_what_the_page_says(page, tmp_path):
+    blocks.run(page, tmp_path)
+
+
+@pytest.mark.parametrize("page", [pytest.param(p, id=p.stem) for p in PAGES if p.stem != "founding-texts"])
+def test_numbers_of_the_prose_are_in_the_code_or_its_results(page):
+    assert blocks.unfounded(page.read_text()) == []
+
+
+def test_the_tutorials_and_guides_are_among_them():
+    assert {"bearing-only", "range-only", "own-problem", "founding-texts"} <= {p.stem for p in PAGES}
+
+
+def test_a_wrong_result_is_noticed(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("```python\nprint(1 + 1)\n```\n\n```text\n3\n```\n")
+    with pytest.raises(AssertionError, match=r"page.md:1 should say\n3\n\nbut gives\n2"):
+        blocks.run(page, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("said", "got", "same"),
+    [("a\n...\nd\n", "a\nb\nc\nd\n", True), ("a\n...\n", "a\n", True), ("a\n", "a\nb\n", False), ("1.0\n", "1x0\n", False)],
+)
+def test_three_dots_stand_for_any_lines_and_nothing_else_does(said, got, same):
+    assert blocks.matches(said, got) == same
+
+
+def test_a_number_out_of_nowhere_is_noticed():
+    page = "It is 2.50 km, `9.99`, not 3.75.\n\n```text\n2.50\n```\n"
+    assert blocks.unfounded(page) == ["3.75"]
+
+
+def test_the_reference_has_every_public_name():
+    named = re.findall(r"^\.\. auto\w+:: piazzi\.(\w+)$", (DOCS / "reference.md").read_text(), re.MULTILINE)
+    assert sorted(named) == sorted(pz.__all__)
+
+
+def test_the_founding_comparison_is_told_with_its_numbers(data_dir):
+    problem, tracking = pz.load(data_dir / "satellite" / "slide_example.npz")
+    half = len(tracking.times) // 2
+
+    def errors(estimator, problem):
+        return np.linalg.norm((estimator.estimate(problem, tracking).mean - tracking.truth)[:, :2], axis=1) / 1e3
+
+    def rms(x):
+        return np.sqrt((x**2).mean())
+
+    fine = errors(pz.ExtendedKalmanFilter(), problem)
+    coarse = errors(pz.ExtendedKalmanFilter(), replace(problem, integrator=pz.Taylor(substeps=1)))
+    page = " ".join((DOCS / "founding-texts.md").read_text().split())
+    assert f"half is {rms(coarse[half:]):.0f} km with one step and {rms(fine[half:]):.1f} km with 15" in page
+    assert f"{rms(errors(pz.FactorGraph(), problem)):.1f} km against {rms(fine):.0f} km" in page
+
+
+def test_what_the_founding_page_names_is_there():
+    page = (DOCS / "founding-texts.md").read_text()
+    for call in re.findall(r"`pz\.(\w+)", page):
+        assert hasattr(pz, call), call
+    for script in re.findall(r"examples/\w+\.py", page):
+        ast.parse((DOCS.parent / script).read_text())
