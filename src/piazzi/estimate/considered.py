@@ -19,8 +19,7 @@ Run = Callable[[_Estimator, Problem, Tracking], Estimate]
 
 def considered_names(problem: Problem) -> tuple[str, ...]:
     """Names of the parameters that are considered and uncertain."""
-    names = (p.name for p in problem.model.parameters if p.role == "considered")
-    return tuple(n for n in names if problem.parameters[n].covariance[0, 0] > 0)
+    return problem.considered
 
 
 def with_considered(run: Run[_Estimator]) -> Run[_Estimator]:

@@ -167,7 +167,7 @@ class Problem:
 
     def _lay_out(self) -> None:
         """Make the arrays now, so that no run has to."""
-        for name in ("mean", "covariance", "given", "narrowest", "_traits"):
+        for name in ("mean", "covariance", "given", "narrowest", "considered", "_traits"):
             getattr(self, name)
         for name in ("sensor", "noise", "correlated", "numbers"):
             getattr(self, f"station_{name}")
@@ -204,6 +204,12 @@ class Problem:
         """Index of each station's sensor, (S,)."""
         names = [s.name for s in self.model.sensors]
         return np.array([names.index(s.sensor) for s in self.stations], dtype=np.int64)
+
+    @cached_property
+    def considered(self) -> tuple[str, ...]:
+        """Names of the parameters that are considered and uncertain."""
+        names = (p.name for p in self.model.parameters if p.role == "considered")
+        return tuple(n for n in names if self.parameters[n].covariance[0, 0] > 0)
 
     @cached_property
     def narrowest(self) -> int:
@@ -277,7 +283,8 @@ class Problem:
         start = float(times[0]) if self.prior_time is None else float(self.prior_time)
         if start > times[0]:
             raise ValueError(f"the prior is at {start:g} s, after the first measurement at {times[0]:g} s")
-        manoeuvres.check_after(self.manoeuvres, start)
+        if self.manoeuvres:
+            manoeuvres.check_after(self.manoeuvres, start)
         dt = np.empty_like(times)
         dt[0] = times[0] - start
         np.subtract(times[1:], times[:-1], out=dt[1:])
