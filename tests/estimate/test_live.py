@@ -156,18 +156,75 @@ def test_what_cannot_be_taken_is_said(two_radars, monkeypatch):
         assert np.isfinite(live.mean).all()
 
 
-def test_a_refused_time_leaves_the_epoch_open(two_radars, monkeypatch):
+FILTERS = {
+    "ekf": pz.ExtendedKalmanFilter(),
+    "ekf:gate": pz.ExtendedKalmanFilter(gate=0.99),
+    "iekf": pz.ExtendedKalmanFilter(iterations=3),
+    "srekf": pz.SquareRootKalmanFilter(),
+    "ukf": pz.UnscentedKalmanFilter(),
+}
+
+
+@pytest.mark.parametrize("estimator", FILTERS.values(), ids=FILTERS)
+def test_a_refused_time_leaves_the_epoch_open(two_radars, estimator, monkeypatch):
     """After a measurement that came too late, the next row of the epoch still belongs to it."""
     monkeypatch.setenv("PIAZZI_JIT", "0")
     problem, tracking = two_radars
-    whole = pz.UnscentedKalmanFilter().estimate(problem, tracking)
-    live = pz.UnscentedKalmanFilter().start(problem)
+    whole = estimator.estimate(problem, tracking)
+    live = estimator.start(problem)
     for row, (t, name, z) in enumerate(zip(tracking.row_times, tracking.row_stations, tracking.values, strict=True)):
         if row % 2:
+            before = {what: array.copy() for what, array in live.checkpoint().items()}
             with pytest.raises(ValueError, match="is before"):
-                live.predict(t - 0.01)
+                live.update(str(name), z, t - 0.01)
+            with pytest.raises(ValueError, match="must be finite"):
+                live.predict(np.nan)
+            for what, array in live.checkpoint().items():
+                assert_array_equal(array, before[what])
         live.update(str(name), z, t)
-    assert_array_equal(live.mean, whole.mean[-1])
+    assert_allclose(live.mean, whole.mean[-1], rtol=0, atol=1e-13)
+    assert_allclose(live.covariance, whole.covariance[-1], rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("estimator", FILTERS.values(), ids=FILTERS)
+def test_a_row_counts_once_whatever_is_refused_between(estimator, monkeypatch):
+    """Prior and two rows that say 0, 1 and 1 with variance 1 each: mean 2/3, variance 1/3."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x"], ["0"], [pz.Sensor("level", ["x"])])
+    stations = [pz.Station(name, "level", 1.0) for name in ("a", "b")]
+    live = estimator.start(pz.Problem(model, pz.Gaussian(0.0, 1.0), None, stations))
+    live.update("a", 1.0, 5.0)
+    with pytest.raises(ValueError, match="time 4 s is before 5 s"):
+        live.update("a", 1.0, 4.0)
+    live.update("b", 1.0, 5.0)
+    assert_allclose(live.mean, [2 / 3], rtol=1e-12)
+    assert_allclose(live.covariance, [[1 / 3]], rtol=1e-12)
+
+
+def test_the_innovation_of_a_window_is_that_of_the_last_row_or_nan(two_radars, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem, tracking = two_radars
+    estimator = pz.SlidingWindow(lag=6)
+    whole, live = estimator.estimate(problem, tracking), estimator.start(problem)
+    assert np.isnan(live.innovation).all()
+    assert np.isnan(live.innovation_covariance).all()
+    rows = zip(tracking.row_times, tracking.row_stations, tracking.values, strict=True)
+    for row, (t, name, z) in enumerate(rows):
+        live.update(str(name), z, t)
+        assert_allclose(live.innovation, whole.innovations[row], rtol=0, atol=1e-13)
+        assert_allclose(live.innovation_covariance, whole.innovation_covariances[row], rtol=0, atol=1e-13)
+    again, old = estimator.start(problem), estimator.start(problem)
+    again.restore(live.checkpoint())
+    assert_array_equal(again.innovation, live.innovation)
+    assert_array_equal(again.innovation_covariance, live.innovation_covariance)
+    old.restore({what: array for what, array in live.checkpoint().items() if not what.startswith("innovation")})
+    assert np.isnan(old.innovation).all()
+    assert old.innovation_covariance.shape == live.innovation_covariance.shape
+    assert live.update("west", 3.0, tracking.times[-1] - 0.05)
+    assert np.isnan(live.innovation).all()
+    assert np.isnan(live.innovation_covariance).all()
+    again.update("west", 3.0, tracking.times[-1])
+    assert np.isfinite(again.innovation).all()
 
 
 @pytest.mark.parametrize(

@@ -28,15 +28,16 @@ class Clock:
         self.time = problem.prior_time
         self._steps: dict[float, tuple[int, float]] = {}
 
-    def interval(self, t: float) -> float:
-        """Seconds from the last epoch to `t`; raises ValueError where that is not a time after it."""
+    def interval(self, t: float, since: float | None = None) -> float:
+        """Seconds to `t` from `since`, or else from the last epoch; ValueError where `t` is earlier. Changes nothing."""
         if not np.isfinite(t):
             raise ValueError(f"time is {t}; it must be finite")
-        if self.time is None:
+        since = self.time if since is None else since
+        if since is None:
             check_after(self.problem.manoeuvres, t)
-        dt = 0.0 if self.time is None else t - self.time
+        dt = 0.0 if since is None else t - since
         if dt < 0:
-            raise ValueError(f"time {t:g} s is before {self.time:g} s, where the estimate stands")
+            raise ValueError(f"time {t:g} s is before {since:g} s, where the estimate stands")
         return dt
 
     def step(self, dt: float) -> tuple[int, float]:
@@ -154,10 +155,10 @@ class LiveFilter:
         """Carry the belief to time `t`, from the last epoch that had a measurement; raises ValueError where `t` is earlier."""
         if self._measured and t == self._predicted_to:
             return
+        dt = self._clock.interval(t, self._predicted_to if self._measured else None)  # a time that is refused changes nothing
         if self._measured:
             self._base_mean[:], self._base_covariance[:] = self.mean, self.covariance
             self._clock.time, self._measured = self._predicted_to, False
-        dt = self._clock.interval(t)
         self._times[0], self._times[1], self._times[3] = t if self._clock.time is None else self._clock.time, dt, t
         if dt > 0:
             self._count[0], self._times[2] = self._clock.step(dt)

@@ -56,16 +56,10 @@ class LiveRootFilter:
         measured = len(self._values) > 0
         if measured and t == self.time:
             return False
+        self._clock.interval(t, self.time if measured else None)  # a time that is refused changes nothing
         if measured:
-            before, self._clock.time = self._clock.time, self.time
-            try:
-                self._clock.interval(t)
-            except ValueError:
-                self._clock.time = before
-                raise
-            self.base_mean, self.base_root = self.mean, self.root
+            self._clock.time, self.base_mean, self.base_root = self.time, self.mean, self.root
             self._values, self._rows_of = self._values[:0], self._rows_of[:0]
-        self._clock.interval(t)
         self.time = t
         return True
 

@@ -35,12 +35,13 @@ class LiveWindow:
     times, means : (W,), (W, n), the states in the window
     oldest : Gaussian, the first of them given all that the window knows: the delayed estimate, with its covariance
     refused : list of (time, station)
-    innovation, innovation_covariance : of the last row taken in
+    innovation, innovation_covariance : (m,), (m, m)
+        Of the last row taken in; NaN before the first, and after one that came late, of which the window keeps none.
     """
 
     saved_names = (
         *("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before"),
-        *("nu_lin", "H_lin", "dx", "mean", "covariance", "oldest_covariance"),
+        *("nu_lin", "H_lin", "dx", "mean", "covariance", "oldest_covariance", "innovation", "innovation_covariance"),
     )
 
     def __init__(
@@ -58,7 +59,7 @@ class LiveWindow:
         self._m, self._P = problem.mean.copy(), problem.covariance.copy()
         self._newest = problem.mean.copy(), problem.covariance.copy()
         self._row = np.full(m, np.nan)
-        self._nu, self._S = np.empty((0, m)), np.empty((0, m, m))
+        self.innovation, self.innovation_covariance = np.full(m, np.nan), np.full((m, m), np.nan)
         self._t, self._count, self._scale = np.empty(0), np.empty(0, dtype=np.int64), np.empty(0)
         self._first_row, self._z, self._station = np.zeros(1, dtype=np.int64), np.empty((0, m)), np.empty(0, dtype=np.int64)
         self._x, self._x_before, self._late_covariance = np.empty((0, n)), np.empty((0, n)), np.empty((0, n, n))
@@ -82,16 +83,6 @@ class LiveWindow:
         if not len(self._t):
             raise ValueError("there is no state in the window yet")
         return Gaussian(self._x[0].copy(), self._late_covariance[0].copy())
-
-    @property
-    def innovation(self) -> Array:
-        nu: Array = self._nu[-1].copy()
-        return nu
-
-    @property
-    def innovation_covariance(self) -> Array:
-        S: Array = self._S[-1].copy()
-        return S
 
     # ---- measurements --------------------------------------------------------------------------------------------
 
@@ -143,7 +134,10 @@ class LiveWindow:
         else:
             self._insert(t)
         self._add_row(int(np.searchsorted(self._t, t)), s)
-        self._settle()
+        nu, S = self._settle()
+        late = t < self._t[-1]  # the innovations that there are belong to the newest epoch
+        self.innovation = np.full_like(nu[-1], np.nan) if late else nu[-1].copy()
+        self.innovation_covariance = np.full_like(S[-1], np.nan) if late else S[-1].copy()
         return True
 
     _pending: float | None = None
@@ -239,8 +233,10 @@ class LiveWindow:
 
     # ---- the window ----------------------------------------------------------------------------------------------
 
-    def _settle(self, all_covariances: bool = False) -> None:
-        p, W = self.problem, len(self._t)
+    def _settle(self) -> tuple[Array, Array]:
+        """Gauss-Newton steps over the window; innovations (J, m) with covariances, those of the newest epoch filled in."""
+        p, W, (J, M) = self.problem, len(self._t), self._z.shape
+        nu, S = np.empty((J, M)), np.empty((J, M, M))
         space = self._buffers()
         self._x = np.ascontiguousarray(self._x)
         self._library.live_settle(
@@ -265,12 +261,13 @@ class LiveWindow:
             self._x,
             self._late_covariance,
             self.covariance,
-            self._nu,
-            self._S,
-            int(all_covariances),
+            nu,
+            S,
+            0,
         )
         self.mean = self._x[-1].copy()
         self._newest = self.mean.copy(), self.covariance.copy()
+        return nu, S
 
     def _buffers(self) -> tuple[Array, ...]:
         """Work space of at least the window's size; it keeps the last linearisation for when the oldest state leaves."""
@@ -298,7 +295,6 @@ class LiveWindow:
                 np.empty((n, n)),
             )
             self._late_covariance = np.empty((big, n, n))
-        self._nu, self._S = np.empty((J, m)), np.empty((J, m, m))
         return self._space
 
     def checkpoint(self) -> dict[str, Array]:
@@ -311,12 +307,16 @@ class LiveWindow:
         return out | {
             "mean": self.mean.copy(),
             "covariance": self.covariance.copy(),
+            "innovation": self.innovation.copy(),
+            "innovation_covariance": self.innovation_covariance.copy(),
             "refused": np.array([len(self.refused)], dtype=float),
         }
 
     def restore(self, saved: Mapping[str, Array]) -> None:
         """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
         n, m = self.problem.model.n, self.problem.model.width
+        # checkpoints of earlier versions have none
+        saved = {"innovation": np.full(m, np.nan), "innovation_covariance": np.full((m, m), np.nan)} | dict(saved)
         for name in (*_KEPT, "mean", "covariance"):
             if name not in saved:
                 raise ValueError(f"the checkpoint has no {name!r}")
@@ -332,6 +332,7 @@ class LiveWindow:
             "station": (J,),
         }
         shapes |= {"x": (W, n), "x_before": (W, n), "mean": (n,), "covariance": (n, n)}
+        shapes |= {"innovation": (m,), "innovation_covariance": (m, m)}
         shapes |= {"nu_lin": (J * m,), "H_lin": (J * m, n), "dx": (W, n), "oldest_covariance": (n, n)} if W else {}
         for name, shape in shapes.items():
             if name not in saved or np.shape(saved[name]) != shape:
@@ -347,6 +348,8 @@ class LiveWindow:
             raise ValueError("the checkpoint's rows and times are not in order")
         self.mean, self.covariance = np.array(saved["mean"], dtype=float), np.array(saved["covariance"], dtype=float)
         self._newest = self.mean.copy(), self.covariance.copy()
+        self.innovation = np.array(saved["innovation"], dtype=float)
+        self.innovation_covariance = np.array(saved["innovation_covariance"], dtype=float)
         if W:
             self._buffers()
             self._nu_lin[: J * m], self._H_lin[: J * m], self._dx[:W] = saved["nu_lin"], saved["H_lin"], saved["dx"]
