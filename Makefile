@@ -30,8 +30,9 @@ demo: .venv/.package ## write figures, tables and data of a first run into demo/
 	@$(BIN)/piazzi demo -o demo
 
 docs: .venv/.docs .venv/.package ## build the documentation into build/docs, without a network and strictly
-	@PIAZZI_CACHE="$${PIAZZI_CACHE:-$(CURDIR)/.cache/tests}" $(BIN)/sphinx-build --quiet --fail-on-warning --jobs auto \
-		--doctree-dir .cache/doctrees docs build/docs
+	@rm -rf build/docs
+	@PIAZZI_CACHE="$${PIAZZI_CACHE:-$(CURDIR)/.cache/tests}" $(BIN)/sphinx-build --quiet --fail-on-warning --fresh-env \
+		--jobs auto --doctree-dir .cache/doctrees docs build/docs
 	@echo "Open build/docs/index.html"
 
 test: .venv/.dev .venv/.package ## fast tests (ARGS='tests/test_structure.py -k upstream' narrows them)

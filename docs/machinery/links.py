@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
-from sphinx.application import Sphinx
-from sphinx.util import logging
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
-LOGGER = logging.getLogger(__name__)
 FETCHED = {"script": "src", "img": "src", "link": "href", "iframe": "src", "source": "src", "object": "data"}
 REMOTE = re.compile(r"(?:url\(\s*['\"]?|@import\s+['\"])(?:https?:)?//")
 
@@ -58,9 +58,11 @@ def faults(folder: Path) -> list[str]:
 
 
 def check(app: Sphinx, failure: Exception | None) -> None:
+    from sphinx.util import logging
+
     if failure is None and app.builder.name == "html":
         for fault in faults(Path(app.outdir)):
-            LOGGER.warning(fault)
+            logging.getLogger(__name__).warning(fault)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

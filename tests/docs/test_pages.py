@@ -15,6 +15,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 sys.path.insert(0, str(DOCS / "machinery"))
 try:
     import blocks
+    import links
 finally:
     sys.path.pop(0)
 
@@ -83,3 +84,19 @@ def test_what_the_founding_page_names_is_there():
         assert hasattr(pz, call), call
     for script in re.findall(r"examples/\w+\.py", page):
         ast.parse((DOCS.parent / script).read_text())
+
+
+def test_dead_links_and_requests_are_noticed(tmp_path):
+    (tmp_path / "a.html").write_text(
+        '<a href="b.html#there">b</a><a href="b.html#not">b</a><a href="c.html">c</a><a href="#me" id="me">'
+    )
+    (tmp_path / "b.html").write_text(
+        '<h1 id="there"></h1><script src="https://example.org/x.js"></script><a href="https://example.org">'
+    )
+    (tmp_path / "s.css").write_text("body { background: url(//example.org/x.png) }")
+    assert links.faults(tmp_path) == [
+        "a.html: b.html#not has no such place",
+        "a.html: c.html leads nowhere",
+        "b.html: fetches https://example.org/x.js",
+        "s.css: fetches from elsewhere",
+    ]
