@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,7 @@ def run_study(
     try:
         team = _team(study, workers, scheduler)
         try:
+            import_module("h5netcdf")  # now, while the workers start, and not when everybody waits for the file
             Runner(study, log, team, chunk, progress).run()
         finally:
             team.close()

@@ -100,8 +100,8 @@ class Log:
         return _unpacked(*found)
 
     def pieces(self) -> Iterator[Piece]:
-        """All pieces, one at a time."""
-        for entry in self.entries:
+        """All pieces, one at a time, in the order of points and runs, whatever the order in which they were finished."""
+        for entry in sorted(self.entries, key=lambda entry: (entry.task.point, entry.task.first)):
             yield self.read(entry)
 
     def close(self) -> None:
