@@ -150,3 +150,21 @@ def test_long_runs_are_kept_at_evenly_spaced_epochs():
     assert (study.kept[0], study.kept[-1]) == (0, 1440)
     assert_array_equal(np.diff(study.kept), 12)
     assert_array_equal(small().kept, np.arange(30))
+
+
+def test_considered_parameters_count_in_a_study_too():
+    """Their share of the covariance is not the lanes' to add: such runs go one by one."""
+    model = pz.Model(
+        ["x", "v"], ["v", "-k*x"], [pz.Sensor("place", ["x"])], [pz.Parameter("k", "considered")], groups={"all": ["x", "v"]}
+    )
+    problem = pz.Problem(
+        model,
+        pz.Gaussian([1.0, 0.0], [0.1, 0.1]),
+        pz.ProcessNoise([1e-4, 1e-4], "step"),
+        [pz.Station("west", "place", 0.01)],
+        {"k": pz.Gaussian(1.0, 0.04)},
+        pz.RungeKutta4(2),
+    )
+    study = Study(problem, np.arange(10) * 0.3, ["ekf"], 3)
+    task = Task(0, 0, 3)
+    assert_equals_compare(study, run_task(study, task), simulated(study, task))

@@ -180,7 +180,7 @@ def _estimated(study: Study, label: str, estimator: Any, runs: _Runs) -> list[tu
 
 def _filters_in_lanes(estimator: Any, belief: Problem) -> bool:
     plain = type(estimator) is ExtendedKalmanFilter and estimator.guard is None and estimator.update != "joint"
-    return plain and in_lanes(belief)
+    return plain and in_lanes(belief) and not belief.considered
 
 
 def _filter(study: Study, runs: _Runs, left: list[int], out: Scored) -> list[int]:
