@@ -58,8 +58,12 @@ def main(path: str) -> None:
         worst = problem.model.names[int(np.argmax(off))]
         print(f"{name} from there with 10 sigma: {estimate.message or 'ends'} {off.max():.2f} sigma from batch ({worst})")
     cold = pz.ExtendedKalmanFilter().estimate(problem, tracking)
-    print(f"ekf from the cold prior: {cold.message or 'finished'}")
+    off = np.abs(cold.mean[-1] - batch.mean[-1]) / np.sqrt(np.diag(batch.covariance[-1]))
+    verdict = "passes" if cold.success and (off <= 3).all() else f"fails, {cold.message or f'{off.max():.3g} sigma from batch'}"
+    print(f"ekf from the cold prior: {verdict}")
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    main(sys.argv[1])

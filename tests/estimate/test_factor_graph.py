@@ -230,7 +230,7 @@ def test_constant_that_process_noise_moves_stays_in_the_chain(monkeypatch):
     model = pz.Model(["a"], ["0"], [pz.Sensor("sum", ["a + b"])], [pz.Parameter("b", "estimated")])
     noise = pz.ProcessNoise(np.diag([0.0, 0.1]), "step")
     tracking = pz.Tracking(np.arange(3.0), [1.0, 2.0, 3.0])
-    for sigma, told in ((1.0, ""), (1e9, "process noise moves an estimated constant")):
+    for sigma, told in ((1.0, ""), (1e9, "process noise or a manoeuvre moves an estimated constant")):
         prior, constant = pz.Gaussian([0.0], [sigma**2]), pz.Gaussian(1.0, 1.0)
         problem = pz.Problem(model, prior, noise, [pz.Station("here", "sum", 1.0)], {"b": constant})
         estimate = pz.FactorGraph().estimate(problem, tracking)
@@ -238,6 +238,32 @@ def test_constant_that_process_noise_moves_stays_in_the_chain(monkeypatch):
         assert told in estimate.message
         with pytest.raises(ValueError, match=r"'bordered' cannot be used: .* process noise"):
             pz.FactorGraph(solver="bordered").estimate(problem, tracking)
+
+
+def test_constant_that_a_manoeuvre_resets_stays_in_the_chain(monkeypatch):
+    """A bias that jumps by five in the middle of the run."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["a"], ["0"], [pz.Sensor("sum", ["a + b"])], [pz.Parameter("b", "estimated")])
+    stations, jump = [pz.Station("here", "sum", 0.01)], pz.Manoeuvre(2.5, [5.0], [0.0], ["b"])
+    constant, prior = pz.Gaussian(0.5, 1.0), pz.Gaussian([0.0], [1e-6])
+    problem = pz.Problem(model, prior, None, stations, {"b": constant}, manoeuvres=[jump])
+    tracking = pz.Tracking(np.arange(6.0), [0.6, 0.6, 0.6, 5.6, 5.6, 5.6])
+    estimate = pz.FactorGraph().estimate(problem, tracking)
+    assert estimate.success, estimate.message
+    assert estimate.details["solver"] == "chain"
+    assert_allclose(estimate.mean[:, 1], [0.6] * 3 + [5.6] * 3, atol=1e-3)
+
+
+def test_slow_convergence_is_not_taken_for_rounding(monkeypatch):
+    """(x, x^2) measured as (0, 0.45): Gauss-Newton's rate at the solution 0 is 0.9."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x"], ["0"], [pz.Sensor("both", {"itself": "x", "squared": "x**2"})])
+    problem = pz.Problem(model, pz.Gaussian([0.5], [1e6]), None, [pz.Station("here", "both", [1.0, 1.0])])
+    tracking = pz.Tracking([0.0], [[0.0, 0.45]])
+    for estimator in (pz.FactorGraph(max_iterations=400), pz.BatchLeastSquares(max_iterations=400)):
+        estimate = estimator.estimate(problem, tracking)
+        assert estimate.success, estimate.message
+        assert abs(estimate.mean[0, 0]) < 1e-4
 
 
 def test_step_that_forgets_a_state_under_a_wide_prior(monkeypatch):
@@ -358,6 +384,17 @@ def test_what_nobody_sees_under_a_huge_prior_is_named(monkeypatch):
         assert_allclose(np.diagonal(estimate.covariance, axis1=1, axis2=2), np.tile([0.25, variance], (4, 1)))
         assert estimate.success == (not told)
         assert ("do not determine 'unseen'" in estimate.message) == told
+
+
+def test_a_correction_with_a_tight_prior_about_zero_is_no_failure(monkeypatch):
+    """Measurements that hardly inform it leave it as the prior had it, which was no open question."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x"], ["0"], [pz.Sensor("place", ["x + bias"])], [pz.Parameter("bias", "estimated")])
+    station, bias = pz.Station("here", "place", 1.0), {"bias": pz.Gaussian(0.0, 0.01)}
+    problem = pz.Problem(model, pz.Gaussian([1.0], [1e8]), None, [station], bias)
+    for estimator in (pz.FactorGraph(), pz.BatchLeastSquares()):
+        estimate = estimator.estimate(problem, pz.Tracking(np.arange(3.0), [1.0, 1.1, 0.9]))
+        assert estimate.success, estimate.message
 
 
 def test_combination_that_nobody_sees_is_named(monkeypatch):

@@ -42,6 +42,17 @@ def test_considered_numbers_stay_out_of_the_state():
         b612(stations=[pz.Station("radar", "range", 0.01, UNCERTAIN, considered=["my"])])
 
 
+@pytest.mark.parametrize("name", ["mxx", "x", "mu"])
+def test_numbers_that_the_sensor_does_not_use_are_refused(name):
+    with pytest.raises(ValueError, match=rf"station 'radar' gives '{name}', which sensor 'range' does not use"):
+        b612(stations=[pz.Station("radar", "range", 0.01, {"mx": 10.0, "my": 0.0, name: pz.Gaussian(0.0, 1.0)})])
+
+
+def test_considered_is_a_list():
+    with pytest.raises(ValueError, match="considered is 'mx'; it must be a list"):
+        b612(stations=[pz.Station("radar", "range", 0.01, UNCERTAIN, considered="mx")])
+
+
 def test_units_of_numbers_are_those_of_the_constants():
     sensor = pz.Sensor("range", ["sqrt((x - mx)**2 + y**2)"], number_units={"mx": "m"})
     model = pz.Model(["x", "y"], ["0", "0"], [sensor])

@@ -104,10 +104,11 @@ def predicted(comparison: Comparison, ahead: str) -> dict[str, Forecast]:
     import numpy as np
 
     from piazzi.cli.ahead import times_ahead
+    from piazzi.estimate.considered import has_considered
 
     times = times_ahead(ahead, float(comparison.tracking.times[-1]))
     usable = {name: e for name, e in comparison.estimates.items() if np.isfinite([*e.mean[-1], *e.covariance[-1].flat]).all()}
-    return {name: estimate.predict(times) for name, estimate in usable.items()}
+    return {name: estimate.predict(times) for name, estimate in usable.items() if has_considered(estimate)}
 
 
 def to_dict(comparison: Comparison, forecasts: Mapping[str, Forecast]) -> dict[str, Any]:

@@ -120,11 +120,11 @@ class BatchLeastSquares:
         if not outcome.failure:
             return outcome, used
         graph = FactorGraph().estimate(calm, tracking)
-        if not graph.success:
-            return outcome, used
-        states = graph.details["first_state"]
-        again = optimize(chain, solver, np.broadcast_to(states, chain.x.shape), self.max_iterations, self.tolerance)
-        return replace(again, iterations=outcome.iterations + graph.iterations + again.iterations), f"{used}, then graph"
+        begin = np.asarray(graph.details["first_state"]) if graph.success else chain.x[0].copy()
+        again = optimize(chain, solver, np.broadcast_to(begin, chain.x.shape), self.max_iterations, self.tolerance)
+        spent = outcome.iterations + graph.iterations + again.iterations
+        told = f"{again.failure}; the full graph: {graph.message}" if again.failure and not graph.success else again.failure
+        return replace(again, iterations=spent, failure=told), f"{used}, then graph" if graph.success else used
 
     def _first(self, problem: Problem) -> Array:
         if self.start is None:

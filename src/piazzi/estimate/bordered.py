@@ -67,8 +67,10 @@ class BorderedSolver:
 
     @staticmethod
     def applies(problem: Problem) -> bool:
-        """Whether the constants are constant: one that process noise moves has to stay in the chain."""
-        return not problem.process_noise.covariance[len(problem.model.moving) :].any()
+        """Whether the constants are constant: one that noise or a manoeuvre moves has to stay in the chain."""
+        constants = set(problem.model.constants)
+        still = all(constants.isdisjoint(m.states) for m in problem.manoeuvres)
+        return still and not problem.process_noise.covariance[len(problem.model.moving) :].any()
 
     def begin(self, states: Array) -> Array:
         """The states with one value of each constant, that of the last epoch."""
@@ -99,7 +101,7 @@ class BorderedSolver:
         c.dx[:, :nd], c.multiplier[:, :nd] = self.dx, self.multiplier
         if self.C:
             c.dx[:, nd:], c.multiplier[:, nd:] = constants, 0.0
-        c.report[GRADIENT] = c.change() ** 2
+        c.report[GRADIENT] = c.change(c.dx) ** 2
         c.report[STEP] = c.largest_step(c.P_pred)
 
     def _split(self) -> None:

@@ -113,23 +113,32 @@ class Chain:
 
     def largest_step(self, covariance: Array) -> float:
         """The largest step in standard deviations, without rounding; infinite where a value that is certain moves."""
-        variance = np.diagonal(covariance, axis1=1, axis2=2)
-        with np.errstate(all="ignore"):
+        with np.errstate(invalid="ignore"):
             moved = np.maximum(np.abs(self.dx) - ROUNDING * np.abs(self.x), 0.0)
-            sigmas = np.where(moved == 0.0, 0.0, moved / np.sqrt(variance))
-            return float(sigmas.max()) if np.isfinite(sigmas).all() and np.isfinite(self.dx).all() else np.inf
+        return self.largest(np.where(np.isfinite(self.dx), moved, np.inf), covariance)
 
-    def change(self) -> float:
-        """What the step changes in all measurements, in units of their noise, as a length."""
-        dx = np.repeat(self.dx, np.diff(self.inputs.first_row), axis=0)
-        moved = (self.H @ dx[:, :, None])[:, :, 0]
-        return float(np.linalg.norm(np.where(np.isnan(self.nu), 0.0, moved)))
+    def largest(self, changes: Array, covariance: Array) -> float:
+        """The largest of changes (K, n) in standard deviations; infinite where a value that is certain changes."""
+        with np.errstate(all="ignore"):
+            sigmas = np.abs(changes) / np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        sigmas = np.where(changes == 0.0, 0.0, sigmas)
+        return float(sigmas.max()) if np.isfinite(sigmas).all() else np.inf
+
+    def change(self, changes: Array) -> float:
+        """What changes (K, n) of the states make of all measurements, in units of their noise, as a length."""
+        return float(np.linalg.norm(np.where(np.isnan(self.nu), 0.0, self.by_measurement(changes))))
+
+    def by_measurement(self, changes: Array) -> Array:
+        """Changes (K, n) of the states as changes of the measurements in units of their noise, (J, m)."""
+        rows = np.repeat(changes, np.diff(self.inputs.first_row), axis=0)
+        with np.errstate(all="ignore"):
+            return np.asarray((self.H @ rows[:, :, None])[:, :, 0])
 
     def cost_rounding(self) -> float:
         """How much of the cost may be rounding of the states."""
-        x = np.repeat(np.abs(self.x), np.diff(self.inputs.first_row), axis=0)
+        rows = np.repeat(np.abs(self.x), np.diff(self.inputs.first_row), axis=0)
         with np.errstate(all="ignore"):
-            return float(np.nansum(np.abs(self.nu) * (np.abs(self.H) @ (ROUNDING * x)[:, :, None])[:, :, 0]))
+            return float(np.nansum(np.abs(self.nu) * (np.abs(self.H) @ (ROUNDING * rows)[:, :, None])[:, :, 0]))
 
     def innovations(self) -> tuple[Array, Array]:
         """Innovations and their covariances along the final linearisation, (J, m) and (J, m, m)."""

@@ -11,7 +11,9 @@ import numpy as np
 
 from piazzi.estimate.estimator import Estimate
 from piazzi.problem import Gaussian, Problem, Tracking
+from piazzi.problem.checks import Array
 
+JUMP = 1.0  # standard deviations of the estimate that a parameter's small change may bend it by
 STEP = 0.1  # of a parameter's sigma, to either side: small beside what bends, large beside rounding
 _Estimator = TypeVar("_Estimator")
 Run = Callable[[_Estimator, Problem, Tracking], Estimate]
@@ -56,13 +58,35 @@ def _inflated(nominal: Estimate, name: str, above: Estimate, below: Estimate) ->
         if not side.success:
             return replace(nominal, failure=f"with the considered parameter {name!r} moved by {STEP:g} sigma: {side.message}")
     s = (above.mean - below.mean) / (2 * STEP)
-    e = (above.innovations - below.innovations) / (2 * STEP)
+    e = _wrapped(nominal, above.innovations - below.innovations) / (2 * STEP)
+    sigma = np.sqrt(np.maximum(np.diagonal(nominal.covariance, axis1=1, axis2=2), 0.0))
+    if (np.abs(above.mean + below.mean - 2 * nominal.mean) > JUMP * sigma + 0.5 * np.abs(above.mean - below.mean)).any():
+        return replace(nominal, failure=f"the estimate jumps where the considered parameter {name!r} changes a little")
     changes: dict[str, Any] = {
         "covariance": nominal.covariance + s[:, :, None] * s[:, None, :],
         "innovation_covariances": nominal.innovation_covariances + e[:, :, None] * e[:, None, :],
         "seconds": nominal.seconds + above.seconds + below.seconds,
         "details": {**nominal.details, f"considered_{name}": s},
     }
+    if "cross_covariances" in nominal.details:
+        cross = nominal.details["cross_covariances"] + s[:-1, :, None] * s[1:, None, :]
+        changes["details"]["cross_covariances"] = cross
     if nominal.delayed is not None and above.delayed is not None and below.delayed is not None:
         changes["delayed"] = _inflated(nominal.delayed, name, above.delayed, below.delayed)
     return replace(nominal, **changes)
+
+
+def _wrapped(estimate: Estimate, differences: Array) -> Array:
+    """Differences of innovations (J, m), those of angles in (-pi, pi]."""
+    problem = estimate.problem
+    angle = np.zeros((len(problem.stations), differences.shape[1]), dtype=bool)
+    for s, station in enumerate(problem.stations):
+        marks = problem.model.sensor(station.sensor).is_angle
+        angle[s, : len(marks)] = marks
+    rows = angle[estimate.tracking.stations_of(problem)]
+    return np.where(rows, differences - 2 * np.pi * np.ceil((differences - np.pi) / (2 * np.pi)), differences)
+
+
+def has_considered(estimate: Estimate) -> bool:
+    """Whether the estimate tells what each considered parameter does to it: one that failed does not."""
+    return all(f"considered_{name}" in estimate.details for name in considered_names(estimate.problem))

@@ -7,7 +7,7 @@ import numpy as np
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
-OPEN = 1e3  # times the size of a value: a prior that wide says that it is not known
+OPEN = 1e6  # times the size of a value: a prior that wide says that it is not known
 UNTOUCHED = 0.9  # of the prior's variance: the measurements said nothing
 
 
@@ -23,7 +23,7 @@ def undetermined(problem: Problem, first: Array, states: Array) -> str:
     sigma = np.sqrt(np.diag(problem.covariance))
     size = _sizes(problem, states)
     wide = sigma > OPEN * size
-    if not wide.any():
+    if not wide.any() or not np.isfinite(first).all():
         return ""
     unit = np.where(sigma > 0, sigma, 1.0)
     values, vectors = np.linalg.eigh(first / np.outer(unit, unit))
@@ -35,13 +35,13 @@ def undetermined(problem: Problem, first: Array, states: Array) -> str:
 
 
 def _sizes(problem: Problem, states: Array) -> Array:
-    """How large each value is along the way: its own absolute value, or the length of the group that it belongs to."""
+    """How large each value is along the way, or the group that it belongs to as a vector; one unit at least."""
     with np.errstate(over="ignore"):
-        size = np.abs(states).max(axis=0)
+        size = np.maximum(np.abs(states).max(axis=0), np.abs(problem.mean))
         for members in problem.model.group_indices.values():
             columns = list(members)
             size[columns] = np.maximum(size[columns], np.sqrt((states[:, columns] ** 2).sum(axis=1)).max())
-    return np.where(size > 0, size, max(float(size.max()), 1.0))
+    return np.asarray(np.maximum(size, 1.0))
 
 
 def _words(problem: Problem, direction: Array) -> str:

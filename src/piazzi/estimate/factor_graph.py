@@ -30,7 +30,7 @@ SOLVERS = ("auto", "chain", "bordered")
 DIFFUSE = 1e10
 # iterations that a second solution may take before the first is kept
 CHALLENGE = 20
-RESTLESS = "the bordered form does not apply, because process noise moves an estimated constant"
+RESTLESS = "the bordered form does not apply, because process noise or a manoeuvre moves an estimated constant"
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate.chain import DEFECT, GRADIENT, STEP, STEP_SMOOTHED, Chain, Solver
+from piazzi.estimate.chain import DEFECT, GRADIENT, ROUNDING, STEP, STEP_SMOOTHED, Chain, Solver
 from piazzi.problem.checks import Array
 
 TOO_WIDE = "the prior is too wide for covariances"
 FIRST_DAMPING, LARGEST_DAMPING = 1e-4, 1e12
-NEARLY = 1e-3  # of a standard deviation: steps below that no longer shrink are rounding
+NEARLY, ROUGHLY = 1e-3, 10.0  # steps below so much of a sigma may be rounding, within so many times its estimate
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +30,8 @@ def optimize(
 ) -> Outcome:
     """Iterate from the states `start` until no state and no measurement moves by more than `tolerance` standard deviations.
 
-    Measurements count too because a combination of states can be known much better than each of them.  Steps below a
-    thousandth of a standard deviation that no longer shrink are rounding of the states, and end the iterations as well.
+    Measurements count too because a combination of states can be known much better than each of them.  Small steps that no
+    longer shrink and are no larger than what rounding of the states makes of them end the iterations as well.
     A step that raises the merit is damped as much as it takes (Levenberg-Marquardt, scaled by the prior), except the first.
     The merit is the cost, and for directions without noise, where the dynamics must hold, twice the defect at the price of
     its multiplier (an exact penalty: Nocedal and Wright 2006, eq. 15.24).  Ends at once, with the failure `TOO_WIDE`, where
@@ -45,14 +45,16 @@ def optimize(
     costs, covariance, iteration, before = [cost], None, 0, np.inf
     for iteration in range(1, max_iterations + 1):
         solver.solve(damping)
-        if iteration == 1 and widest < np.inf and not solver.widest() <= widest:
+        if iteration == 1 and widest < solver.widest() < np.inf:
             return Outcome(chain.P_pred, iteration, TOO_WIDE, _figures(chain, solver, costs))
         size = _size(chain)
-        at_rounding = NEARLY > size > 0.5 * before and not chain.reweighted
+        stuck = damping == 0.0 and NEARLY > size > max(0.5 * before, tolerance) and not chain.reweighted
+        at_rounding = stuck and size <= ROUGHLY * _rounding(chain, solver)
         if damping == 0.0 and np.isfinite(cost) and (size <= tolerance or at_rounding):
             covariance = solver.marginals()
             if chain.report[STEP_SMOOTHED] <= (NEARLY if at_rounding else tolerance):
                 chain.x[:] = solver.moved(chain.x, chain.dx)
+                chain.d_pred -= chain.dx  # predictions are about the states as they now are
                 failure = ""
                 break
             covariance = None
@@ -72,6 +74,22 @@ def optimize(
 def _size(chain: Chain) -> float:
     """The step that was solved for, in standard deviations: the largest of any state, or of the measurements together."""
     return float(max(chain.report[STEP], np.sqrt(chain.report[GRADIENT])))
+
+
+def _rounding(chain: Chain, solver: Solver) -> float:
+    """How much of a step may be rounding: what changes, in the measure of `_size`, where states are rounded otherwise.
+
+    The last bits of all states decide the last bits of what the dynamics make of them; here these are drawn anew.
+    """
+    f, nu, step = chain.f.copy(), chain.nu.copy(), chain.dx.copy()
+    bits = ROUNDING * np.abs(chain.x) * np.random.default_rng(0).uniform(-1.0, 1.0, chain.x.shape)
+    chain.f[:-1] += bits[1:]
+    chain.nu += chain.by_measurement(bits)
+    solver.solve(0.0)
+    chain.f[:], chain.nu[:] = f, nu
+    other = chain.dx.copy()
+    solver.solve(0.0)
+    return max(chain.largest(other - step, chain.P_pred), chain.change(other - step))
 
 
 def _step(chain: Chain, solver: Solver, cost: float, damping: float, gated: bool) -> tuple[bool, float, float]:

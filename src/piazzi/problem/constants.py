@@ -21,6 +21,8 @@ def with_station_constants(
     """
     out, values = [], dict(parameters)
     for station in stations:
+        if isinstance(station.considered, str):
+            raise ValueError(f"station {station.name!r}: considered is {station.considered!r}; it must be a list of names")
         uncertain = [name for name, value in station.numbers.items() if isinstance(value, Gaussian)]
         for name in station.considered:
             if name not in uncertain:
@@ -32,6 +34,12 @@ def with_station_constants(
             out.append(station)
             continue
         sensor = model.sensor(station.sensor)
+        for name in uncertain:
+            if name not in model.numbers(sensor):
+                raise ValueError(
+                    f"station {station.name!r} gives {name!r}, which sensor {sensor.name!r} does not use"
+                    f"{nearest(name, model.numbers(sensor))}"
+                )
         names = {name: _free(constant_name(name, station.name), model) for name in uncertain}
         model = _extended(model, sensor, station, names)
         values |= {names[name]: station.numbers[name] for name in uncertain}
