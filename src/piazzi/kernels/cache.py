@@ -57,9 +57,7 @@ def _from_disk_or_built(spec: KernelSpec) -> SimpleNamespace:
     entries = _read(place / digest) if place else None
     if entries is None:
         home = writable_folder() / digest
-        LOGGER.info(
-            "compiling %s for %s, once (about 5 to 15 s) ...", " + ".join(spec.fragments[-1:]), ", ".join(spec.model.names)
-        )
+        LOGGER.info("compiling %s for %s, once (about 3 to 15 s) ...", spec.fragments[-1], spec.subject)
         started = time.perf_counter()
         entries = _build(spec, home)
         LOGGER.debug("compiled in %.1f s into %s", time.perf_counter() - started, home)

@@ -12,7 +12,15 @@ import numpy as np
 POINTER, INTEGER, REAL = "pointer", "integer", "real"
 _C_TYPES = {POINTER: ctypes.c_void_p, INTEGER: ctypes.c_int64, REAL: ctypes.c_double}
 # Numba's wrapper mentions these for its error path, which kernels never take: they raise nothing
-_NEVER_CALLED = ("numba_gil_ensure", "numba_gil_release", "NRT_MemInfo_call_dtor", "numba_unpickle")
+_NEVER_CALLED = (
+    "NRT_Free",
+    "NRT_MemInfo_call_dtor",
+    "numba_do_raise",
+    "numba_gil_ensure",
+    "numba_gil_release",
+    "numba_runtime_build_excinfo_struct",
+    "numba_unpickle",
+)
 
 
 class Entry:
