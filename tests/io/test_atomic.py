@@ -5,7 +5,7 @@ import stat
 
 import pytest
 
-from piazzi.io.atomic import atomic_path, check_writable
+from piazzi.io.atomic import atomic_path, check_writable, sweep
 
 
 def test_a_finished_file_takes_the_place_of_the_old_one(tmp_path):
@@ -70,3 +70,10 @@ def test_a_folder_without_permission_is_told(tmp_path):
     tmp_path.chmod(0o500)
     with pytest.raises(PermissionError, match="cannot write"):
         check_writable(tmp_path / "file")
+
+
+def test_what_killed_writers_left_is_swept(tmp_path):
+    for name in (".s-abcd_123.nc", ".s-abcd_123.csv", ".t-abcd_123.nc", ".s-short.nc", "s.nc"):
+        (tmp_path / name).write_text("x")
+    sweep(tmp_path / "s.nc")
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([".s-abcd_123.csv", ".t-abcd_123.nc", ".s-short.nc", "s.nc"])

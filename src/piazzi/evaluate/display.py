@@ -211,10 +211,16 @@ def _tested(rows: Sequence[Row]) -> list[str]:
             found.setdefault(_list(failing(row)), []).append(_named(row, rows))
     out = [f"Test of {wrong} not passed by {_list(names)} (5 % level)." for wrong, names in found.items()]
     passed = [_named(r, rows) for r in judged if not failing(r)]
-    if not passed:
-        return out
     who = "All others pass" if out else f"{passed[0]} passes" if len(passed) == 1 else "All pass"
-    return [*out, f"{who} all tests of honesty (NEES, NIS, whiteness, bias; 5 % level)."]
+    out += [f"{who} all tests of honesty (NEES of the last half, NIS, whiteness, bias; 5 % level)."] if passed else []
+    early = [_named(r, rows) for r in judged if _fails_early(r)]
+    return out + ([f"Before that, errors of {_list(early)} are not what was claimed (NEES of the whole run)."] if early else [])
+
+
+def _fails_early(row: Row) -> bool:
+    """Whether NEES is out of its bounds over the whole run, but not over its last half."""
+    whole, last = row.honesty.nees, row.honesty.nees_last_half
+    return whole is not None and last is not None and last.passed and not whole.passed
 
 
 def _rejected(comparison: Comparison) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import stat
 import tempfile
@@ -40,6 +41,16 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     finally:
         with suppress(FileNotFoundError):
             work.unlink()
+
+
+def sweep(path: str | os.PathLike[str]) -> None:
+    """Remove what writers of `path` left behind that were killed; only for who knows that nobody else is writing it."""
+    target = Path(os.path.realpath(path))
+    name = re.compile(re.escape(f".{target.stem[:40]}-") + r"[a-z0-9_]{8}" + re.escape(target.suffix[-40:]))
+    for leftover in target.parent.glob(".*"):
+        if name.fullmatch(leftover.name):
+            with suppress(OSError):
+                leftover.unlink()
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:

@@ -123,6 +123,7 @@ class Processes:
             if task is None:
                 break
             if process.poll() is not None:
+                end(process)
                 process = self._processes[index] = self._start()
             self._outcomes.put(self._run(process, task))
             self._warm.set()
