@@ -137,3 +137,23 @@ def test_values_are_put_in_whatever_the_order_of_axes():
     study = small(vary={"assumed.mu": [900.0], "truth.mu": [1100.0]})
     world, belief = problems_at(study.problem, study.axes, (900.0, 1100.0))
     assert (world.parameters["mu"], belief.parameters["mu"]) == (1100.0, 900.0)
+
+
+def test_windows_that_differ_in_more_than_their_length_keep_their_names():
+    study = pz.Study.of("b612-range", runs=4, estimators=["window:100", "window:100:huber"], vary={"lag": [10, 20]})
+    assert [(label, e.lag, e.loss is None) for label, e in study.variants.items()] == [
+        ("window:10", 10, True),
+        ("window:20", 20, True),
+        ("window:100:huber:lag=10", 10, False),
+        ("window:100:huber:lag=20", 20, False),
+    ]
+    with pytest.raises(ValueError, match="length in seconds"):
+        pz.Study.of("b612-range", runs=4, estimators=["window:3s"], vary={"lag": [5, 20]})
+
+
+def test_huge_axes_are_counted_at_once():
+    with pytest.raises(ValueError, match="1,000,000 points"):
+        pz.Study.of("b612-range", runs=4, vary={"R.scale": [1.0 + 1e-6 * i for i in range(1_000_000)]})
+    with pytest.raises(ValueError, match="estimates are allowed"):
+        lags, iterations = list(range(1, 100_001)), list(range(1, 100_001))
+        pz.Study.of("b612-range", runs=4, estimators=["window:5"], vary={"lag": lags, "iterations": iterations})

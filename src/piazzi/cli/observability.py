@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from piazzi.cli import options, output, reporting
-from piazzi.cli.running import DONE
+from piazzi.cli.running import DONE, NOT_ESTIMATED
 
 if TYPE_CHECKING:
     from piazzi.evaluate import Observability
@@ -73,7 +73,7 @@ def command(
 
         wrote = [f"Wrote {path}" for path in (output_file, report) if path]
         output.print_rich(heading(problem, tracking, source_found.name), "", found, *wrote)
-    return DONE
+    return DONE if found.success else NOT_ESTIMATED
 
 
 def write(path: str, found: Observability) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from piazzi.cli import options, output, reporting
-from piazzi.cli.running import DONE, NOT_ESTIMATED
+from piazzi.cli.running import DONE, NOT_ESTIMATED, say
 from piazzi.cli.windows import whole_numbers
 
 if TYPE_CHECKING:
@@ -87,5 +87,11 @@ def _more(comparison: Comparison, lags: tuple[int, ...], seen: bool) -> tuple[li
         sections.append(windows_section(trade))
         well = trade.success
     if seen:
-        sections.append(observability_section(observability(problem, tracking, source=comparison.source)))
+        try:
+            found = observability(problem, tracking, source=comparison.source)
+        except ValueError as error:  # the rest of the page stands
+            say(f"nothing on observability: {error}")
+            return sections, False
+        sections.append(observability_section(found))
+        well = well and found.success
     return sections, well

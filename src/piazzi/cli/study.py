@@ -73,7 +73,7 @@ def command(
     say(_size(study), prefix="")
     run = {"resume": resume, "workers": workers, "scheduler": scheduler, "chunk": chunk}
     with _place(output_file) as path:
-        stored = _run(study, path, run)
+        stored = _run(study, path, run, lasting=output_file is not None)
         summary = stored.summary
         wrote = [f"Wrote {output_file}"] if output_file else []
         if figures is not None:
@@ -138,7 +138,7 @@ def _place(output_file: str | None) -> Iterator[Path]:
         yield Path(folder) / "study.nc"
 
 
-def _run(study: Study, path: Path, run: dict[str, Any]) -> Stored:
+def _run(study: Study, path: Path, run: dict[str, Any], lasting: bool) -> Stored:
     from piazzi.study import kept_runs, run_study
 
     total = study.points * study.runs
@@ -147,8 +147,10 @@ def _run(study: Study, path: Path, run: dict[str, Any]) -> Stored:
             return run_study(study, path, progress=progress, **run)
     except (KeyboardInterrupt, OSError, RuntimeError) as error:
         kept = kept_runs(path)
-        if kept:
+        if kept and lasting:
             say(f"{kept:,} of {total:,} runs are kept beside {path}: --resume goes on from there")
+        elif kept:
+            say(f"the {kept:,} finished runs are gone: with -o FILE they are kept, and --resume goes on from there")
         if isinstance(error, RuntimeError):
             raise ValueError(str(error)) from error
         raise

@@ -72,6 +72,7 @@ class Observability:
     twins : tuple of Twin, other first states with the same measurements, best first
     attempts : tuple of Attempt, what estimators made of it beside the bound; empty without truth
     added : Observability with further stations, None where none were asked for
+    message : why the factor graph, whose estimate stands in for the truth, did not succeed; "" where it did
     """
 
     problem: Problem
@@ -88,6 +89,12 @@ class Observability:
     twins: tuple[Twin, ...]
     attempts: tuple[Attempt, ...] = ()
     added: Observability | None = None
+    message: str = ""
+
+    @property
+    def success(self) -> bool:
+        """Whether the states that everything was linearised about can be relied on."""
+        return not self.message
 
     @property
     def singular_values(self) -> Array:
@@ -124,6 +131,8 @@ class Observability:
             "twins": [_twin(twin) for twin in self.twins],
             "verdict": self.verdict,
             "about": self.about,
+            "success": self.success,
+            "message": self.message,
             "state": self.state.tolist(),
             "units": {name: model.unit(name) for name in model.names},
             "scale": self.scale.tolist(),
@@ -204,9 +213,9 @@ def observability(
     """
     inputs = prepare(problem, tracking)
     more = _with_stations(problem, add) if add else None
-    states, about = _about(problem, tracking)
+    states, about, message = _about(problem, tracking)
     found = _observability(problem, tracking, inputs, states, about, twins, source)
-    found = replace(found, attempts=attempts(problem, tracking, found.twins))
+    found = replace(found, attempts=attempts(problem, tracking, found.twins), message=message)
     if more is None:
         return found
     wider = _with_rows(tracking, problem, more)
@@ -220,15 +229,15 @@ def _with_stations(problem: Problem, add: Sequence[Addition]) -> Problem:
     return replace(problem, model=model, stations=[*problem.stations, *stations])
 
 
-def _about(problem: Problem, tracking: Tracking) -> tuple[Array, str]:
-    """States to linearise about (K, n), and what they are."""
+def _about(problem: Problem, tracking: Tracking) -> tuple[Array, str, str]:
+    """States to linearise about (K, n), what they are, and why they may be wrong."""
     truth = full_truth(problem, tracking)
     if truth is not None:
-        return truth, "truth"
+        return truth, "truth", ""
     estimate = FactorGraph().estimate(problem, tracking)
     if not np.isfinite(estimate.mean).all():
         raise ValueError(f"there is no truth, and the factor graph has no estimate to take its place: {estimate.message}")
-    return estimate.mean, "estimate"
+    return estimate.mean, "estimate", estimate.message
 
 
 def _observability(

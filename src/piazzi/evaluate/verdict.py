@@ -31,7 +31,9 @@ def weakest(names: Sequence[str], direction: Array) -> dict[str, float]:
 
 def verdict(found: Observability) -> str:
     """What was found and what follows from it, in sentences."""
-    return printable(" ".join([*_local(found), *_twins(found), *_conclusion(found)]))
+    doubt = f"Not to be relied on: the factor graph, whose estimate stands in for the truth, did not succeed: {found.message}."
+    doubts = [] if found.success else [doubt]
+    return printable(" ".join([*doubts, *_local(found), *_twins(found), *_conclusion(found)]))
 
 
 def _local(found: Observability) -> list[str]:

@@ -27,11 +27,13 @@ class Axis:
     def __post_init__(self) -> None:
         if not self.values:
             raise ValueError(f"{self.name} is to be varied, but over no values")
+        seen: set[Value] = set()
         for i, value in enumerate(self.values):
             if isinstance(value, float) and not isfinite(value):
                 raise ValueError(f"value {i} of {self.name} is {value}; it must be finite")
-            if value in self.values[:i]:
+            if value in seen:
                 raise ValueError(f"{self.name} takes the value {value} twice")
+            seen.add(value)
 
 
 def read_value(text: Any) -> Value:

@@ -98,9 +98,11 @@ class Study:
         if self.points > MOST_POINTS or self.estimates > MOST_ESTIMATES:
             sizes = " x ".join(str(len(axis.values)) for axis in self.axes) or "1"
             raise ValueError(
-                f"the grid of {sizes} has {self.points:,} points, with {self.runs:,} runs of {len(self.variants)} estimators "
-                f"{self.estimates:,} estimates; at most {MOST_POINTS:,} points and {MOST_ESTIMATES:,} estimates are allowed"
+                f"the grid of {sizes} has {self.points:,} points, with {self.runs:,} runs of {self._variant_count:,} "
+                f"estimators {self.estimates:,} estimates; at most {MOST_POINTS:,} points and {MOST_ESTIMATES:,} estimates "
+                "are allowed"
             )
+        assert self.variants  # made now, so that what is wrong with a setting is told now
         for values in {v for axis_index in range(len(self.axes)) for v in self._corners(axis_index)}:
             problems_at(self.problem, self.axes, values)
         actual = true_problem(self.problem)
@@ -131,7 +133,13 @@ class Study:
     @property
     def estimates(self) -> int:
         """How many times something is estimated in all."""
-        return self.points * self.runs * len(self.variants)
+        return self.points * self.runs * self._variant_count
+
+    @cached_property
+    def _variant_count(self) -> int:
+        """How many estimators there are with all their settings, without making them."""
+        settings = [estimator_settings(estimator) for estimator in self.estimators.values()]
+        return sum(prod(len(axis.values) for axis in self._split[1] if axis.name in own) for own in settings)
 
     def point(self, index: int) -> tuple[Value, ...]:
         """Values of the axes at a point, the last axis fastest."""
@@ -153,8 +161,13 @@ class Study:
             own = [axis for axis in self._split[1] if axis.name in estimator_settings(estimator)]
             for values in product(*(axis.values for axis in own)):
                 settings = dict(zip((axis.name for axis in own), values, strict=True))
+                if "lag" in settings and getattr(estimator, "lag_seconds", None) is not None:
+                    raise ValueError(f"{name} has a length in seconds, so its lag cannot be varied: give it one in states")
                 made = variant(estimator, settings) if settings else estimator
-                out[_label(name, made, settings)] = made
+                label = _label(name, made, settings)
+                if label in out and _described(out[label]) != _described(made):
+                    raise ValueError(f"two estimators would both be called {label}: vary one at a time, or name them apart")
+                out[label] = made
         return out
 
     @cached_property
@@ -224,7 +237,8 @@ def _listed(given: Any) -> Sequence[Any]:
 
 def _label(name: str, estimator: Any, settings: Mapping[str, Value]) -> str:
     """Name of an estimator with settings of its own: as the command line writes it, where it can."""
-    if isinstance(estimator, SlidingWindow) and name.partition(":")[0] == "window" and {*settings} <= {"lag", "iterations"}:
+    plain = isinstance(estimator, SlidingWindow) and estimator == SlidingWindow(estimator.lag, estimator.iterations)
+    if plain and name.partition(":")[0] == "window" and {*settings} <= {"lag", "iterations"}:
         times = f"x{estimator.iterations}" if estimator.iterations > 1 else ""
         return f"window:{estimator.lag}{times}"
     return ":".join([name, *(f"{k}={v}" for k, v in settings.items())])

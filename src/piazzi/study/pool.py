@@ -65,7 +65,12 @@ class Here:
 
     def wait(self) -> list[Outcome]:
         task = self._tasks.pop(0)
-        return [Outcome(task, run_task(self._study, task))]
+        try:
+            return [Outcome(task, run_task(self._study, task))]
+        except (OSError, MemoryError):
+            raise
+        except Exception as error:  # as a worker process would tell it
+            return [Outcome(task, error=f"{type(error).__name__}: {error}")]
 
     def close(self) -> None:
         self._tasks.clear()
@@ -115,19 +120,27 @@ class Processes:
         return [p.pid for p in self._processes.values() if p.poll() is None]
 
     def _serve(self, index: int) -> None:
-        process = self._processes[index] = self._start()
+        process: subprocess.Popen[bytes] | None = None
+        with suppress(OSError):  # told with the first task
+            process = self._processes[index] = self._start()
         if index:
             self._warm.wait()
         while not self._closed:
             task = self._tasks.get()
             if task is None:
                 break
-            if process.poll() is not None:
-                end(process)
-                process = self._processes[index] = self._start()
-            self._outcomes.put(self._run(process, task))
+            try:
+                if process is None or process.poll() is not None:
+                    if process is not None:
+                        end(process)
+                    process = self._processes[index] = self._start()
+                outcome = self._run(process, task)
+            except Exception as error:  # whatever happens here, the task is answered for: somebody waits for it
+                outcome = Outcome(task, died=f"{type(error).__name__}: {error}")
+            self._outcomes.put(outcome)
             self._warm.set()
-        end(process)
+        if process is not None:
+            end(process)
 
     def _start(self) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-c", "from piazzi.study.worker import main; main()"]

@@ -33,7 +33,7 @@ class Runner:
         self._tries: dict[Task, int] = {}
         self._started: dict[Task, float] = {}
         self._seconds_per_run: float | None = None
-        self._deaths = 0
+        self._deaths, self._works = 0, bool(log.entries)
         self.total = study.points * study.runs
         self.done = self.total - sum(task.count for task in self._gaps)
 
@@ -89,7 +89,7 @@ class Runner:
         task, piece = outcome.task, outcome.piece
         seconds = time.monotonic() - self._started.pop(task)
         if piece is not None:
-            self._deaths = 0
+            self._works = True
             if task.count:
                 rate = seconds / task.count
                 known = self._seconds_per_run
@@ -100,7 +100,7 @@ class Runner:
             raise RuntimeError(outcome.error)
         why = f"killed its worker ({outcome.died})" if outcome.died else outcome.error
         self._deaths += 1
-        if self._deaths > MOST_DEATHS:
+        if self._deaths > MOST_DEATHS and not self._works:
             raise RuntimeError(f"{self._deaths} tasks in a row failed, the last one because it {why}")
         if task.count > 1:
             half = task.count // 2
@@ -111,7 +111,6 @@ class Runner:
         if self._tries[task] <= RETRIES:
             self._again.append(task)
         else:
-            self._deaths = 0
             self._keep(lost(self._study, task, f"{why}, {self._tries[task]} times"))
 
     def _keep(self, piece: Piece) -> None:
