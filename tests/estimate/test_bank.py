@@ -119,6 +119,84 @@ def log_evidence(case, scale, size):
     return -0.5 * (r @ np.linalg.solve(S, r) + np.linalg.slogdet(S)[1])
 
 
+LEVELS = np.array([0.0, 0.1, -0.1, 0.0, 6.0, 10.0, 14.0, 18.0, 22.0])
+
+
+def constant(loss):
+    """A constant measured with unit noise, four good rows and five that spread; and its cost as a function of the constant."""
+    model = pz.Model(["x"], ["0"], [pz.Sensor("level", ["x"])])
+    problem = pz.Problem(model, pz.Gaussian(3.0, 100.0), None, [pz.Station("a", "level", 1.0)])
+
+    def cost(x):
+        s = (LEVELS[:, None] - np.atleast_1d(x)) ** 2
+        return 0.5 * loss.cost(s, np.float64(loss.k**2)).sum(axis=0) + 0.5 * (np.atleast_1d(x) - 3.0) ** 2 / 100.0
+
+    return problem, pz.Tracking(np.arange(9.0), LEVELS), cost
+
+
+@pytest.mark.parametrize("loss", [pz.Tukey(), pz.Cauchy(0.5)], ids=str)
+@pytest.mark.parametrize("start", ["bank", np.zeros((9, 1))], ids=["bank", "given"])
+def test_a_bank_and_given_states_find_the_true_minimum_of_a_loss_with_several(monkeypatch, loss, start):
+    """By the cost on a grid.  Huber's minimum lies in the basin of another one."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem, tracking, cost = constant(loss)
+    grid = np.linspace(-5.0, 30.0, 350_001)
+    values = cost(grid)
+    estimate = pz.FactorGraph(start=start, loss=loss).estimate(problem, tracking)
+    assert estimate.success, estimate.message
+    assert estimate.mean[0, 0] == pytest.approx(grid[values.argmin()], abs=2e-4)
+    assert estimate.details["cost"] == pytest.approx(values.min(), rel=1e-9)
+    assert_allclose(
+        estimate.details["weights"], loss.weight((LEVELS - estimate.mean[0, 0]) ** 2, np.float64(loss.k**2)), atol=1e-5
+    )
+    if isinstance(start, str):
+        modes = estimate.details["modes"]
+        assert estimate.details["start"] == "bank"
+        assert estimate.details["cost"] == modes[0]["cost"]
+        assert_allclose(estimate.details["mode_states"][0], estimate.mean)
+        for mode in modes:
+            x = mode["state"][0]
+            assert mode["cost"] == pytest.approx(cost(x)[0], rel=1e-9)
+            assert cost(x)[0] < min(cost(x - 0.01)[0], cost(x + 0.01)[0])
+
+
+def test_the_start_is_the_usual_one_where_the_bank_finds_no_better(monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    case = LinearCase(2, (1,), seed=1, epochs=5)
+    estimate = pz.FactorGraph(start="bank").estimate(case.problem, case.tracking)
+    assert estimate.details["start"] == "ekf"
+
+
+def test_where_no_start_leads_anywhere_the_usual_one_is_told(monkeypatch):
+    """States, covariance and innovations belong together, and there are no modes."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem, tracking = mirrored()
+    tracking = pz.Tracking(tracking.times[:6], tracking.values[:6])
+    monkeypatch.setattr("piazzi.estimate.bank.STEPS", 1)
+    usual = pz.FactorGraph(max_iterations=1).estimate(problem, tracking)
+    bank = pz.FactorGraph(start=pz.Bank(3), max_iterations=1).estimate(problem, tracking)
+    assert not usual.success
+    assert not bank.success
+    assert bank.details["modes"] == []
+    assert bank.details["mode_states"].shape == (0, 6, 4)
+    assert bank.details["start"] == usual.details["start"]
+    assert_allclose(bank.mean, usual.mean, rtol=1e-12)
+    assert_allclose(bank.covariance, usual.covariance, rtol=1e-9, atol=1e-12)
+    assert_allclose(bank.innovation_covariances, usual.innovation_covariances, rtol=1e-9)
+    assert bank.iterations > usual.iterations
+
+
+def test_a_prior_too_wide_for_the_solver_is_not_tried_by_the_members(monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x", "v"], ["v", "0"], [pz.Sensor("level", ["x"])])
+    problem = pz.Problem(model, pz.Gaussian([0.0, 0.0], 1e14 * np.eye(2)), None, [pz.Station("a", "level", 1.0)])
+    tracking = pz.Tracking(np.arange(5.0), np.arange(5.0))
+    estimate = pz.FactorGraph(start="bank", solver="chain").estimate(problem, tracking)
+    assert "too wide" in estimate.message
+    assert estimate.details["modes"] == []
+    assert estimate.iterations == pz.FactorGraph(solver="chain").estimate(problem, tracking).iterations
+
+
 def test_members_are_the_mean_and_pairs_about_it_that_cover_the_prior():
     problem = b612()
     points = pz.Bank(401).points(problem)

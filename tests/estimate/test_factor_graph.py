@@ -431,3 +431,18 @@ def test_start_of_the_wrong_shape_is_refused():
         pz.FactorGraph(np.zeros((4, 4))).estimate(problem, tracking)
     with pytest.raises(ValueError, match="finite"):
         pz.FactorGraph(np.full((5, 4), np.nan)).estimate(problem, tracking)
+
+
+def test_a_window_behind_the_start_runs_once_whatever_is_considered(monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x"], ["0"], [pz.Sensor("level", ["x + b"])], [pz.Parameter("b", "considered")])
+    problem = pz.Problem(
+        model, pz.Gaussian(0.0, 1.0), None, [pz.Station("a", "level", 1.0)], parameters={"b": pz.Gaussian(0.0, 0.25)}
+    )
+    tracking = pz.Tracking([0.0, 1.0, 2.0], [1.0, 1.0, 1.0])
+    runs = []
+    run = pz.SlidingWindow.first_states
+    monkeypatch.setattr(pz.SlidingWindow, "first_states", lambda self, times: runs.append(1) or run(self, times))
+    estimate = pz.FactorGraph(start="window").estimate(problem, tracking)
+    assert len(runs) == 3  # one for each run of the graph: nominal, and to both sides
+    assert_allclose(estimate.details["considered_b"], -0.5 * 0.75, rtol=1e-9)

@@ -5,14 +5,15 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass, replace
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
 
 from piazzi.estimate.chain import Chain, Solver
-from piazzi.estimate.gauss_newton import Outcome
+from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome
 from piazzi.estimate.inputs import Inputs
 from piazzi.estimate.kalman import filter_run
-from piazzi.estimate.robust import RobustChain, descend, gated_run
+from piazzi.estimate.robust import RobustChain, descend, gated_run, stand
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
@@ -38,8 +39,10 @@ class Bank:
     (Numerische Mathematik 2, 1960) through the quantiles of the normal distribution.  All solutions are weighed by Laplace's
     approximation of their evidence, exp(-cost) / sqrt(det(I + information / prior)), and near-identical ones are merged.
     ``details["modes"]`` lists them, the most probable first, with "probability", "cost", "log_evidence" (up to a constant),
-    "members" that led there and the first "state"; ``details["mode_states"]`` (modes, K, n) has their states.  The
-    probabilities are among the modes found: a bank does not prove that there are no others.
+    "members" that led there and the first "state"; ``details["mode_states"]`` (modes, K, n) has their states; both are empty
+    where no start led anywhere.  ``details["start"]`` is "bank" where the graph's own start did not lead to the first of them.
+    The probabilities are among the modes found: a bank does not prove that there are no others.  With Tukey's or Cauchy's loss
+    each member is followed both from where Huber's leads and from itself, and its cheaper solution counts.
     """
 
     members: int = 16
@@ -62,13 +65,22 @@ class Bank:
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """A solution: states (K, n), their standard deviations, cost, log evidence up to a constant, and how often it was found."""
+    """A solution.
+
+    States (K, n), their standard deviations, log evidence up to a constant, figures of the run that found it, how often it was
+    found, and whether the graph's own start led there.
+    """
 
     states: Array
     sigma: Array
-    cost: float
     log_evidence: float
+    details: dict[str, Any]
     members: int
+    usual: bool
+
+    @property
+    def cost(self) -> float:
+        return float(self.details["cost"])
 
 
 def halton(i: int, n: int) -> list[float]:
@@ -106,22 +118,25 @@ def believing(problem: Problem, mean: Array, covariance: Array) -> Problem:
 def search(bank: Bank, chain: Chain, solver: Solver, inputs: Inputs, first: Outcome, tolerance: float) -> Outcome:
     """The most probable solution among `first`, at which the chain stands, and those of the bank; the chain is left there."""
     modes: list[Mode] = []
-    iterations = first.iterations
+    iterations, states_first = first.iterations, chain.x.copy()
     if not first.failure:
-        modes = merged(modes, found(chain, first))
-    for point in bank.points(chain.problem):
+        modes = merged(modes, found(chain, first, usual=True))
+    # where the prior is too wide for the solver, no member does better
+    for point in bank.points(chain.problem) if not first.failure.startswith(TOO_WIDE) else ():
         states = member_start(bank, chain, inputs, point)
         if not np.isfinite(states).all():
             continue
-        outcome = descend(chain, solver, states, STEPS, tolerance)
+        outcome = descend(chain, solver, states, STEPS, tolerance, direct=True)
         iterations += outcome.iterations
         if not outcome.failure:
             modes = merged(modes, found(chain, outcome))
-    if not modes:
-        return replace(first, iterations=iterations)
     modes.sort(key=lambda mode: -mode.log_evidence)
-    best = descend(chain, solver, modes[0].states, STEPS, tolerance)
-    return replace(best, iterations=iterations + best.iterations, details=best.details | told(modes, chain, inputs))
+    stand(chain, solver, modes[0].states if modes else states_first)
+    details = told(modes, chain, inputs)
+    if not modes:
+        return replace(first, iterations=iterations, details=first.details | details)
+    won = {} if modes[0].usual else {"start": "bank"}
+    return Outcome(solver.marginals(), iterations, "", modes[0].details | details | won)
 
 
 def member_start(bank: Bank, chain: Chain, inputs: Inputs, point: Array) -> Array:
@@ -134,11 +149,11 @@ def member_start(bank: Bank, chain: Chain, inputs: Inputs, point: Array) -> Arra
     return np.vstack([point] * (chain.inputs.epochs - len(states)) + [states])
 
 
-def found(chain: Chain, outcome: Outcome) -> Mode:
+def found(chain: Chain, outcome: Outcome, usual: bool = False) -> Mode:
     """The solution at which the chain stands."""
-    cost = float(outcome.details["cost"])
+    evidence = -float(outcome.details["cost"]) - 0.5 * log_determinant(chain)
     sigma = np.sqrt(np.maximum(np.diagonal(outcome.covariance, axis1=1, axis2=2), 0.0))
-    return Mode(chain.x.copy(), sigma, cost, -cost - 0.5 * log_determinant(chain), 1)
+    return Mode(chain.x.copy(), sigma, evidence, outcome.details, 1, usual)
 
 
 def merged(modes: list[Mode], new: Mode) -> list[Mode]:
@@ -147,7 +162,8 @@ def merged(modes: list[Mode], new: Mode) -> list[Mode]:
         near = np.abs(new.states - mode.states) <= SAME * np.maximum(mode.sigma, new.sigma) + 1e-9 * np.abs(mode.states)
         if near.all():
             better = new if new.cost < mode.cost else mode
-            return [*modes[:i], replace(better, members=mode.members + new.members), *modes[i + 1 :]]
+            both = replace(better, members=mode.members + new.members, usual=mode.usual or new.usual)
+            return [*modes[:i], both, *modes[i + 1 :]]
     return [*modes, new]
 
 
@@ -175,7 +191,7 @@ def log_determinant(chain: Chain) -> float:
 
 def told(modes: list[Mode], chain: Chain, inputs: Inputs) -> dict[str, object]:
     """The modes as details of an estimate; those with hardly any probability are left out."""
-    share = np.exp(np.array([mode.log_evidence for mode in modes]) - modes[0].log_evidence)
+    share = np.exp(np.array([mode.log_evidence - modes[0].log_evidence for mode in modes]))
     share /= share.sum()
     skip = chain.inputs.epochs - inputs.epochs
     kept = [(mode, float(p)) for mode, p in zip(modes, share, strict=True) if p >= NEGLIGIBLE]
@@ -189,4 +205,5 @@ def told(modes: list[Mode], chain: Chain, inputs: Inputs) -> dict[str, object]:
         }
         for mode, p in kept
     ]
-    return {"modes": table, "mode_states": np.array([mode.states[skip:] for mode, _ in kept])}
+    states = np.array([mode.states[skip:] for mode, _ in kept])
+    return {"modes": table, "mode_states": states.reshape(-1, *chain.x[skip:].shape)}

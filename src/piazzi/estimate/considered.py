@@ -90,3 +90,9 @@ def _wrapped(estimate: Estimate, differences: Array) -> Array:
 def has_considered(estimate: Estimate) -> bool:
     """Whether the estimate tells what each considered parameter does to it: one that failed does not."""
     return all(f"considered_{name}" in estimate.details for name in considered_names(estimate.problem))
+
+
+def nominal(estimator: Any, problem: Problem, tracking: Tracking) -> Estimate:
+    """An estimator's estimate for the nominal values of considered parameters: where only its means matter, one run does."""
+    estimate: Estimate = type(estimator).estimate.__wrapped__(estimator, problem, tracking)
+    return estimate

@@ -11,14 +11,14 @@ import numpy as np
 from piazzi.estimate.bank import Bank, search
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
-from piazzi.estimate.considered import with_considered
+from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome
 from piazzi.estimate.inputs import Inputs, prepare, with_prior_node
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.losses import Cauchy, loss_of
-from piazzi.estimate.robust import RobustChain, chain_for, descend, gated_run
+from piazzi.estimate.robust import RobustChain, chain_for, descend, gated_run, stand
 from piazzi.estimate.sliding_window import SlidingWindow
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.problem import Problem, Tracking
@@ -52,6 +52,8 @@ class FactorGraph:
         Covariances throughout, or the first state and the estimated constants beside the chain by column-scaled QR: for
         constants, and for priors about a million times as wide as what the measurements leave, where covariances lose what
         they hold.  "auto" decides, and ``details["solver"]`` tells.
+    loss : Huber, Cauchy or Tukey, or "huber", "cauchy" or "tukey"; optional
+        Rows that do not fit the others are weighted down; ``details["weights"]`` (J,) has the weight of each.
 
     Notes
     -----
@@ -62,8 +64,9 @@ class FactorGraph:
 
     With a loss the cost is the robust one, found by iterated reweighting; the start is a filter with a gate, and where the
     solution then disowns many measurements, a window with a loss and the prior are tried too.  Tukey's and Cauchy's losses are
-    followed from where Huber's leads.  Covariances are those of the weighted measurements: they allow for rows that were
-    weighted down, not for having chosen them by their residuals, and are some per cent off where noise is Gaussian or worse.
+    followed from where Huber's leads, and from given states or a bank's members directly too.  Covariances are those of the
+    weighted measurements: they allow for rows that were weighted down, not for having chosen them by their residuals, and are
+    some per cent off where noise is Gaussian or worse.
     """
 
     start: Any = "ekf"
@@ -102,7 +105,7 @@ class FactorGraph:
         if self._bank is not None:
             outcome = search(self._bank, chain, solver, inputs, outcome, self.tolerance)
         nu, S = chain.innovations()
-        details = outcome.details | {"start": used, "first_state": chain.x[0].copy(), "residuals": chain.residuals()}
+        details = {"start": used} | outcome.details | {"first_state": chain.x[0].copy(), "residuals": chain.residuals()}
         if isinstance(chain, RobustChain):
             details |= {"loss": str(self.loss), "weights": chain.weights}
         failure = outcome.failure or undetermined(problem, outcome.covariance[0], chain.x)
@@ -158,6 +161,7 @@ class FactorGraph:
                 self.max_iterations,
                 self.tolerance,
                 np.inf if wide else DIFFUSE,
+                direct=start == "given",
             )
             tried.append((start, outcome))
             if outcome.failure == TOO_WIDE:
@@ -184,9 +188,7 @@ class FactorGraph:
         other = descend(chain, solver, states, min(self.max_iterations, CHALLENGE), self.tolerance)
         if not other.failure and other.details["cost"] < outcome.details["cost"] - 1e-6:
             return replace(other, iterations=outcome.iterations + other.iterations), True
-        chain.x[:] = x
-        chain.linearize()
-        solver.solve(0.0)
+        stand(chain, solver, x)
         return outcome, False
 
     def _begin(self, start: str, problem: Problem, tracking: Tracking, inputs: Inputs) -> tuple[Array, bool]:
@@ -198,7 +200,7 @@ class FactorGraph:
                 raise ValueError(f"start has shape {states.shape}; it must be ({K}, {n}), and finite")
             return states, False
         if start == "window":
-            first = SlidingWindow(loss=None if self.loss is None else Cauchy()).estimate(problem, tracking)
+            first = nominal(SlidingWindow(loss=None if self.loss is None else Cauchy()), problem, tracking)
             assert first.delayed is not None
             return first.delayed.mean, inconsistent(first.innovations, first.innovation_covariances)
         if start == "ekf" and self.loss is not None:

@@ -73,10 +73,30 @@ def gated_run(problem: Problem, inputs: Inputs) -> Array:
     return guarded_run(problem, inputs, update_fragments(problem, "auto"), Guard(1, GATE))[0]
 
 
+def stand(chain: Chain, solver: Solver, states: Array) -> None:
+    """Leave the chain at `states` (K, n), linearised and solved there."""
+    chain.x[:] = states
+    if np.isfinite(states).all():
+        chain.linearize()
+        solver.solve(0.0)
+    else:
+        chain.d_pred.fill(np.nan)
+        chain.P_pred.fill(np.nan)
+
+
 def descend(
-    chain: Chain, solver: Solver, start: Array, max_iterations: int, tolerance: float, widest: float = np.inf
+    chain: Chain,
+    solver: Solver,
+    start: Array,
+    max_iterations: int,
+    tolerance: float,
+    widest: float = np.inf,
+    direct: bool = False,
 ) -> Outcome:
-    """`optimize`; a loss that adds minima is followed from where the one that adds none leads, which is Huber's."""
+    """`optimize`; a loss that adds minima is followed from where the one that adds none leads, which is Huber's.
+
+    With `direct`, for starts that mean something, it is followed from `start` itself too, and the cheaper solution stays.
+    """
     if not isinstance(chain, RobustChain):
         return optimize(chain, solver, start, max_iterations, tolerance, widest)
     if isinstance(chain.loss, Huber):
@@ -87,4 +107,16 @@ def descend(
     if first.failure == TOO_WIDE:
         return first
     last = optimize(chain, solver, chain.x.copy(), LONGER * max_iterations, tolerance)
-    return replace(last, iterations=first.iterations + last.iterations)
+    led = replace(last, iterations=first.iterations + last.iterations)
+    return _or_directly(chain, solver, start, LONGER * max_iterations, tolerance, led) if direct else led
+
+
+def _or_directly(chain: Chain, solver: Solver, start: Array, max_iterations: int, tolerance: float, led: Outcome) -> Outcome:
+    """The outcome `led`, at which the chain stands, or that from `start` itself where cheaper; the chain is left there."""
+    states = chain.x.copy()
+    own = optimize(chain, solver, start, max_iterations, tolerance)
+    iterations = led.iterations + own.iterations
+    if not own.failure and (led.failure or own.details["cost"] < led.details["cost"]):
+        return replace(own, iterations=iterations)
+    stand(chain, solver, states)
+    return replace(led, iterations=iterations)
