@@ -11,7 +11,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain
-from piazzi.estimate.considered import with_considered
+from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.factor_graph import FactorGraph
@@ -119,7 +119,7 @@ class BatchLeastSquares:
         outcome = optimize(chain, solver, np.broadcast_to(first, chain.x.shape), patience, self.tolerance)
         if not outcome.failure:
             return outcome, used
-        graph = FactorGraph().estimate(calm, tracking)
+        graph = nominal(FactorGraph(), calm, tracking)
         begin = np.asarray(graph.details["first_state"]) if graph.success else chain.x[0].copy()
         again = optimize(chain, solver, np.broadcast_to(begin, chain.x.shape), self.max_iterations, self.tolerance)
         spent = outcome.iterations + graph.iterations + again.iterations
