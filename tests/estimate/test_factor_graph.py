@@ -264,6 +264,7 @@ def test_slow_convergence_is_not_taken_for_rounding(monkeypatch):
         estimate = estimator.estimate(problem, tracking)
         assert estimate.success, estimate.message
         assert abs(estimate.mean[0, 0]) < 1e-4
+        assert estimate.details["stopped"] == "no step above 1e-06 sigma"
 
 
 def test_step_that_forgets_a_state_under_a_wide_prior(monkeypatch):

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from piazzi.study import read_store, run_study, same_results
+from piazzi.study import execute, read_store, run_study, same_results, versions
 from piazzi.study.pieces import Task, simulated
 from piazzi.study.pool import Processes
 from tests.study.estimators import Poison
@@ -169,6 +169,18 @@ def test_a_worker_killed_from_outside_takes_nothing_along(whole, tmp_path, monke
     assert len(killed) == 5
     assert stored.about["messages"] == []
     assert same_results(expected, tmp_path / "s.nc") == []
+
+
+def test_runs_of_other_versions_are_not_gone_on_with(tmp_path, monkeypatch):
+    """Their bits would differ, and nothing would show it."""
+    study, path = small(runs=20), tmp_path / "s.nc"
+    other = versions.fingerprint() | {"numpy": "1.0"}
+    monkeypatch.setattr(execute, "fingerprint", lambda: other)
+    log = execute._log(study, path.with_name("s.nc.runs"), False)
+    log.close()
+    monkeypatch.undo()
+    with pytest.raises(ValueError, match=r"was begun by numpy 1.0, not .* as here: results would not be the same"):
+        run_study(study, path, workers=0, resume=True)
 
 
 @pytest.mark.slow

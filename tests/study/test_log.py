@@ -75,6 +75,23 @@ def test_a_flipped_bit_is_found(path):
     log.close()
 
 
+def test_damage_in_the_middle_costs_the_runs_that_were_there_only(path):
+    log = Log.open(path)
+    middle = log.entries[1].offset
+    log.close()
+    data = bytearray(path.read_bytes())
+    data[middle + 60] ^= 1
+    path.write_bytes(data)
+    log = Log.open(path)
+    assert [entry.task.first for entry in log.entries] == [0, 6]
+    same(piece(6), log.read(log.entries[-1]))
+    log.append(piece(3))
+    log.close()
+    again = Log.open(path)
+    assert [entry.task.first for entry in again.entries] == [0, 6, 3]
+    again.close()
+
+
 @pytest.mark.parametrize("content", [b"", b"x", b"PZRUNS1\n" + b"\xff" * 100, b"\0" * 1000])
 def test_another_file_is_refused_and_left_alone(tmp_path, content):
     path = tmp_path / "other.runs"

@@ -42,7 +42,7 @@ def optimize(
     if not np.isfinite(start).all():
         return _without_start(chain)
     cost, damping, failure = chain.linearize(), 0.0, f"not converged after {max_iterations} iterations"
-    costs, covariance, iteration, before = [cost], None, 0, np.inf
+    costs, covariance, iteration, before, stopped = [cost], None, 0, np.inf, ""
     for iteration in range(1, max_iterations + 1):
         solver.solve(damping)
         if iteration == 1 and widest < solver.widest() < np.inf:
@@ -55,7 +55,7 @@ def optimize(
             if chain.report[STEP_SMOOTHED] <= (NEARLY if at_rounding else tolerance):
                 chain.x[:] = solver.moved(chain.x, chain.dx)
                 chain.d_pred -= chain.dx  # predictions are about the states as they now are
-                failure = ""
+                failure, stopped = "", "steps are rounding" if at_rounding else f"no step above {tolerance:g} sigma"
                 break
             covariance = None
         before = size
@@ -68,7 +68,7 @@ def optimize(
         failure += _weakest(chain)
         solver.solve(0.0)
     covariance = solver.marginals() if covariance is None else covariance
-    return Outcome(covariance, iteration, failure, _figures(chain, solver, costs))
+    return Outcome(covariance, iteration, failure, _figures(chain, solver, costs) | {"stopped": failure or stopped})
 
 
 def _size(chain: Chain) -> float:

@@ -29,7 +29,7 @@ def bound_at(study: Study, point: int) -> dict[str, Array]:
     from piazzi.study.pieces import Task, simulated
 
     views = [view for _, view in study.rows]
-    runs = simulated(study, Task(point, 0, min(study.runs, BOUND_RUNS)))
+    runs = simulated(study, Task(point, 0, min(study.runs, BOUND_RUNS, study.largest_piece)))  # memory stays flat
     good = [i for i, wrong in enumerate(runs.wrong) if not wrong]
     K, G = len(study.times), len(study.groups)
     variance, count = np.full((2, K, G), np.nan), np.zeros(2)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from piazzi.study.pieces import Piece, Task, run_task
 from piazzi.study.plan import Study
 from piazzi.study.pool import THREADS, Outcome, processors
+from piazzi.study.versions import difference_of, fingerprint
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -21,7 +22,6 @@ LOCAL = "local"
 CONNECT_SECONDS = 5  # a dead address fails within ten, however it is dead and with all imports
 COUNT_SECONDS = 2.0
 WORKERS_SECONDS = 30  # until a scheduler has its first worker
-_SAME = ("python", "piazzi", "numpy", "llvmlite", "numba")
 
 
 class Cluster:
@@ -170,35 +170,9 @@ def _check_versions(client: Client, address: str, here: dict[str, str]) -> None:
     except Exception as error:
         raise ValueError(f"workers of {address} cannot run Piazzi: {type(error).__name__}: {error}") from None
     for worker, versions in there.items():
-        difference = _difference(versions, here)
+        difference = difference_of(versions, here)
         if difference:
             raise ValueError(f"worker {worker} has {difference}: results would not be the same")
-
-
-def _difference(there: dict[str, str], here: dict[str, str]) -> str:
-    return "; ".join(
-        f"{name} {there.get(name, 'none')}, not {here[name]} as here" for name in _SAME if there.get(name) != here[name]
-    )
-
-
-@lru_cache(maxsize=1)
-def _fingerprint() -> tuple[tuple[str, str], ...]:
-    import hashlib
-    import platform
-    from importlib.metadata import version
-    from pathlib import Path
-
-    root, text = Path(__file__).resolve().parents[1], hashlib.sha256()
-    for file in sorted(root.rglob("*.py")):
-        text.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
-    own = f"{version('piazzi')} (source {text.hexdigest()[:8]})"
-    others = {name: version(name) for name in ("numpy", "llvmlite", "numba")}
-    return tuple({"python": platform.python_version(), "piazzi": own, **others}.items())
-
-
-def fingerprint() -> dict[str, str]:
-    """Versions of everything that the bits of a result depend on, the text of Piazzi itself included."""
-    return dict(_fingerprint())
 
 
 @lru_cache(maxsize=4)
@@ -210,7 +184,7 @@ def _unpickled(study: bytes) -> Study:
 
 def _run(expected: dict[str, str], study: bytes, task: Task) -> Piece | str:
     """On a worker: the piece, or why this worker must not make one."""
-    difference = _difference(fingerprint(), expected)
+    difference = difference_of(fingerprint(), expected)
     if difference:
         return f"a worker has {difference}: results would not be the same"
     return run_task(_unpickled(study), task)

@@ -15,6 +15,7 @@ from piazzi.study.plan import Study
 from piazzi.study.pool import Here, Processes, Workers, processors
 from piazzi.study.runner import Progress, Runner
 from piazzi.study.store import Stored, read_store, write_store
+from piazzi.study.versions import difference_of, fingerprint
 
 
 def run_study(
@@ -107,14 +108,19 @@ def _finished(study: Study, store: Path, resume: bool) -> Stored | None:
 
 def _log(study: Study, path: Path, resume: bool) -> Log:
     if not path.exists():
-        return Log.create(path, study.specification)
+        return Log.create(path, study.specification | {"versions": fingerprint()})
     if not resume:
         raise ValueError(f"{path} has runs of a study that was not finished: --resume goes on with it, removing it begins anew")
     log = Log.open(path)
+    versions = log.specification.pop("versions", None)
     difference = _difference(log.specification, study.specification)
     if difference:
         log.close()
         raise ValueError(f"{path} has runs of another study: {difference}")
+    change = difference_of(versions if isinstance(versions, dict) else {}, fingerprint())
+    if change:
+        log.close()
+        raise ValueError(f"{path} was begun by {change}: results would not be the same; finish it there, or remove it")
     return log
 
 

@@ -72,7 +72,11 @@ class Log:
         while True:
             found = _read(file)
             if found is None:
-                break
+                behind = _behind(file, end)
+                if behind is None:
+                    break
+                end = file.seek(behind)  # its runs are missing, so they are computed again
+                continue
             entries.append(Entry(Task(*found[0]["task"]), end))
             end = file.tell()
         if os.fstat(file.fileno()).st_size > end:
@@ -145,6 +149,20 @@ def _read(file: IO[bytes]) -> tuple[dict[str, Any], bytes] | None:
         return None
     (size,) = struct.unpack_from("<Q", payload)
     return json.loads(payload[8 : 8 + size]), payload[8 + size :]
+
+
+def _behind(file: IO[bytes], start: int) -> int | None:
+    """Where the record after a damaged one at `start` begins; None where there is none."""
+    file.seek(start)
+    head = file.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        return None
+    magic, length, _ = _HEAD.unpack(head)
+    behind = start + _HEAD.size + int(length)
+    if magic != _MAGIC or not 8 <= length <= _LONGEST or behind + _HEAD.size > os.fstat(file.fileno()).st_size:
+        return None
+    file.seek(behind)
+    return behind if _HEAD.unpack(file.read(_HEAD.size))[0] == _MAGIC else None
 
 
 def _packed(piece: Piece) -> bytes:
