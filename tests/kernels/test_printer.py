@@ -8,7 +8,7 @@ import sympy as sp
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from piazzi.expressions import FUNCTIONS, symbol, to_sympy
+from piazzi.expressions import FUNCTIONS, ExpressionError, symbol, to_sympy
 from piazzi.kernels import plain, printer
 from piazzi.model.derivation import jacobian
 
@@ -63,7 +63,10 @@ POINTS = st.lists(st.floats(-2, 2).map(lambda v: round(v, 3)), min_size=3, max_s
 @given(EXPRESSIONS, POINTS)
 @settings(max_examples=100)
 def test_printed_source_equals_sympy(text, at):
-    outputs = with_gradient(to_sympy(text, SYMBOLS))
+    try:
+        outputs = with_gradient(to_sympy(text, SYMBOLS))
+    except ExpressionError:  # a drawn constant such as sinh(1000), which the language refuses
+        assume(False)
     wanted = [exact(e, *at) for e in outputs]
     assume(np.isfinite(wanted).all() and np.abs(wanted).max() < 1e8)
     # how far rounding of the point itself moves the outputs: an ill-conditioned formula may be off by as much
