@@ -11,7 +11,7 @@ import numpy as np
 
 from piazzi.estimate.estimator import Estimate
 from piazzi.problem import Gaussian, Problem, Tracking
-from piazzi.problem.checks import Array
+from piazzi.simulation import wrapped
 
 JUMP = 1.0  # standard deviations of the estimate that a parameter's small change may bend it by
 STEP = 0.1  # of a parameter's sigma, to either side: small beside what bends, large beside rounding
@@ -58,7 +58,8 @@ def _inflated(nominal: Estimate, name: str, above: Estimate, below: Estimate) ->
         if not side.success:
             return replace(nominal, failure=f"with the considered parameter {name!r} moved by {STEP:g} sigma: {side.message}")
     s = (above.mean - below.mean) / (2 * STEP)
-    e = _wrapped(nominal, above.innovations - below.innovations) / (2 * STEP)
+    rows = nominal.tracking.stations_of(nominal.problem)
+    e = wrapped(nominal.problem, rows, above.innovations - below.innovations) / (2 * STEP)
     sigma = np.sqrt(np.maximum(np.diagonal(nominal.covariance, axis1=1, axis2=2), 0.0))
     if (np.abs(above.mean + below.mean - 2 * nominal.mean) > JUMP * sigma + 0.5 * np.abs(above.mean - below.mean)).any():
         return replace(nominal, failure=f"the estimate jumps where the considered parameter {name!r} changes a little")
@@ -74,17 +75,6 @@ def _inflated(nominal: Estimate, name: str, above: Estimate, below: Estimate) ->
     if nominal.delayed is not None and above.delayed is not None and below.delayed is not None:
         changes["delayed"] = _inflated(nominal.delayed, name, above.delayed, below.delayed)
     return replace(nominal, **changes)
-
-
-def _wrapped(estimate: Estimate, differences: Array) -> Array:
-    """Differences of innovations (J, m), those of angles in (-pi, pi]."""
-    problem = estimate.problem
-    angle = np.zeros((len(problem.stations), differences.shape[1]), dtype=bool)
-    for s, station in enumerate(problem.stations):
-        marks = problem.model.sensor(station.sensor).is_angle
-        angle[s, : len(marks)] = marks
-    rows = angle[estimate.tracking.stations_of(problem)]
-    return np.where(rows, differences - 2 * np.pi * np.ceil((differences - np.pi) / (2 * np.pi)), differences)
 
 
 def has_considered(estimate: Estimate) -> bool:

@@ -103,7 +103,7 @@ def propagate(
     check_finite(problem, epochs, first, states)
     if v is not None:
         z += np.einsum("jab,jb->ja", np.linalg.cholesky(problem.station_noise)[row_station], v)
-    return states, _wrapped(problem, row_station, z)
+    return states, wrapped(problem, row_station, z)
 
 
 def check_finite(problem: Problem, epochs: Array, first: Array, states: Array) -> None:
@@ -175,7 +175,7 @@ def check_times(times: Any) -> Array:
     return out
 
 
-def _wrapped(problem: Problem, row_station: Array, z: Array) -> Array:
+def wrapped(problem: Problem, row_station: Array, z: Array) -> Array:
     """Angle components brought into (-pi, pi]."""
     angle = np.zeros((len(problem.stations), z.shape[1]), dtype=bool)
     for s, station in enumerate(problem.stations):
