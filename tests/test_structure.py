@@ -1,8 +1,10 @@
 """The direction of flow: a stage imports from itself and from the stages before it, and all of them reach the wheel."""
 
 import ast
+import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -67,6 +69,33 @@ def test_imports_point_upstream():
         if RANK[stage] > RANK.get(stage_of(module), len(STAGES))
     ]
     assert not wrong, "\n".join(wrong)
+
+
+def packages_imported(folder: Path) -> dict[str, str]:
+    """Packages of others that files below a folder import by name, with one place for each."""
+    own = {"piazzi", "tests", *(file.stem for part in ("docs", "examples") for file in (ROOT / part).rglob("*.py"))}
+    found: dict[str, str] = {}
+    for file in sorted(folder.rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [node.module] if isinstance(node, ast.ImportFrom) and not node.level else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            for name in {str(n).partition(".")[0] for n in names} - sys.stdlib_module_names - own:
+                found.setdefault(name, f"{file.relative_to(ROOT)}:{node.lineno}")
+    return found
+
+
+def declared(requirements: list[str]) -> set[str]:
+    """What requirements bring by name, extras and all: ``dask[distributed]>=1`` is dask and distributed."""
+    return {name for text in requirements for name in re.findall(r"[\w.-]+", re.split(r"[<>=!~;]", text)[0])}
+
+
+def test_every_package_imported_is_declared():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras, runtime = project["optional-dependencies"], declared(project["dependencies"])
+    in_a_notebook = {"IPython"}  # which is there where it is imported
+    for folder, known in (("src", declared(extras["cluster"]) | in_a_notebook), ("tests", declared(extras["dev"]))):
+        unknown = {name: place for name, place in packages_imported(ROOT / folder).items() if name not in runtime | known}
+        assert not unknown, unknown
 
 
 @pytest.mark.slow
