@@ -14,6 +14,8 @@ import pytest
 
 import piazzi
 from piazzi.study import run_study, same_results
+from piazzi.study.cluster import Cluster
+from piazzi.study.pieces import Task, run_task
 from tests.study.studies import small
 
 pytest.importorskip("distributed", reason="Dask is not installed")
@@ -131,6 +133,42 @@ def test_killed_worker_and_killed_scheduler(tmp_path):
     again = subprocess.run(study_program(*runs, "-o", path, "--resume"), capture_output=True, text=True)
     assert again.returncode == 0, again.stderr
     assert same_results(tmp_path / "whole.nc", path) == []
+
+
+@pytest.mark.parametrize("losses", [1, 0])
+def test_results_that_a_worker_took_with_it_are_made_again(monkeypatch, losses):
+    """The worker that finished a task is killed before its results are fetched: another one makes the same bits."""
+    monkeypatch.setattr("piazzi.study.cluster.LOSSES", losses)
+    study, task = small(estimators=("ekf",)), Task(0, 0, 8)
+    expected = run_task(study, task).arrays  # first: by then, every kernel is compiled
+    team = Cluster(study, "local", 1)
+    try:
+        team.submit(task)
+        ((future, _),) = team._futures.values()
+        _wait_for(lambda: future.status == "finished")
+        (pid,) = team._client.run(os.getpid).values()
+        os.kill(pid, signal.SIGKILL)
+        _wait_for(lambda: future.status == "lost")
+        (outcome,) = team.wait()
+    finally:
+        team.close()
+    assert outcome.task == task
+    assert outcome.error == ""
+    if not losses:
+        assert outcome.died == "lost before its results were fetched"
+        return
+    assert outcome.died == ""
+    assert expected.keys() == outcome.piece.arrays.keys()
+    for name in expected.keys() - {"seconds"}:
+        assert expected[name].tobytes() == outcome.piece.arrays[name].tobytes(), name
+
+
+def _wait_for(condition):
+    for _ in range(1200):
+        if condition():
+            return
+        time.sleep(0.02)
+    raise AssertionError("waited for nothing")
 
 
 def _until(condition, process):

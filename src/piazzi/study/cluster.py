@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 import pickle
 import time
+from collections import Counter
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from functools import lru_cache
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from piazzi.study.pieces import Piece, Task, run_task
 from piazzi.study.plan import Study
@@ -22,6 +24,7 @@ LOCAL = "local"
 CONNECT_SECONDS = 5  # a dead address fails within ten, however it is dead and with all imports
 COUNT_SECONDS = 2.0
 WORKERS_SECONDS = 30  # until a scheduler has its first worker
+LOSSES = 3  # times that a task is run again because its worker was gone before its results were fetched
 
 
 class Cluster:
@@ -53,6 +56,7 @@ class Cluster:
         self._study, self._here = pickle.dumps(study), fingerprint()
         self._futures: dict[str, tuple[Future, Task]] = {}
         self._done: SimpleQueue[str] = SimpleQueue()
+        self._losses: Counter[Task] = Counter()
         self._slots, self._counted = 1, -COUNT_SECONDS
         self._cluster = _local(workers) if address == LOCAL else None
         self.address = self._cluster.scheduler_address if self._cluster else address
@@ -81,10 +85,16 @@ class Cluster:
 
     def wait(self) -> list[Outcome]:
         while True:
-            if self._client.status not in ("running", "connecting"):
-                self._gone()
-            with suppress(Empty):
-                return [self._outcome(*self._futures.pop(self._done.get(timeout=1)))]
+            self._check_connected()
+            try:
+                key = self._done.get(timeout=1)
+            except Empty:
+                continue
+            future, task = self._futures.pop(key)
+            outcome = self._outcome(future, task)
+            if outcome is not None:
+                return [outcome]
+            self.submit(task)
 
     def close(self) -> None:
         for thing in (getattr(self, "_client", None), getattr(self, "_cluster", None)):
@@ -92,24 +102,41 @@ class Cluster:
                 with suppress(Exception):
                     thing.close(timeout=3)
 
-    def _outcome(self, future: Future, task: Task) -> Outcome:
+    def _outcome(self, future: Future, task: Task) -> Outcome | None:
+        """What became of a task, None where its results were lost with a worker and it has to run again."""
         from distributed.scheduler import KilledWorker
 
         if future.status in ("cancelled", "lost"):
-            self._gone()
+            return self._lost(task)
         try:
             result = future.result(timeout=CONNECT_SECONDS)
         except KilledWorker:
             return Outcome(task, died="worker lost")
-        except TimeoutError:
-            self._gone()
+        except (TimeoutError, CancelledError):
+            return self._lost(task)
         except Exception as error:
             return Outcome(task, error=f"{type(error).__name__}: {' '.join(str(error).split())}")
         if isinstance(result, Piece):
             return Outcome(task, result)
         return Outcome(task, error=str(result), hopeless=True)
 
-    def _gone(self) -> None:
+    def _lost(self, task: Task) -> Outcome | None:
+        """The same where a task was finished and its results are not to be had: the worker is gone, or the scheduler is."""
+        self._check_connected()
+        try:
+            _knock(self.address)
+        except ConnectionError:
+            self._gone()
+        self._losses[task] += 1
+        if self._losses[task] <= LOSSES:
+            return None
+        return Outcome(task, died="lost before its results were fetched")
+
+    def _check_connected(self) -> None:
+        if self._client.status not in ("running", "connecting"):
+            self._gone()
+
+    def _gone(self) -> NoReturn:
         raise ConnectionError(f"the scheduler at {self.address} is gone; what was finished is kept")
 
 
