@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from piazzi.cli import options, output, reporting
-from piazzi.cli.running import DONE, NOT_ESTIMATED
+from piazzi.cli import options, reporting
+from piazzi.cli.ending import Ending
 
 if TYPE_CHECKING:
     from piazzi.evaluate import Comparison
+    from piazzi.present.report import Tab
 
 DEFAULT = ("ekf", "graph", "window:100")
-ENDINGS = (".json", ".csv")
 
 
 @click.command(cls=options.WithEstimators)
@@ -45,38 +45,22 @@ def command(
       piazzi compare b612-range-q0 --seed 7
       piazzi compare tracking.npz --report out
     """
-    output.check_output(output_file, ENDINGS)
-    reporting.check(report)
+    ending = Ending(output_file, as_json, report)
+    ending.check()
     estimators = options.parsed(names, DEFAULT)
     from piazzi.cli.comparing import run_comparison
 
     source_name, comparison, warning = run_comparison(source, estimators, seed, scenario, bar=report is not None)
-    if output_file is not None:
-        write(output_file, comparison)
-    if report is not None:
-        report = write_report(report, comparison, warning, *reporting.titled(source, source_name, scenario))
-    if as_json:
-        if output_file != output.STDOUT:
-            output.print_json(comparison.to_dict())
-    elif output_file != output.STDOUT:
-        from piazzi.present.tables import heading
 
-        wrote = [f"Wrote {path}" for path in (output_file, report) if path]
-        output.print_rich(heading(comparison.problem, comparison.tracking, source_name), "", comparison, *wrote)
-    return DONE if comparison.success else NOT_ESTIMATED
+    def tab() -> Tab:
+        from piazzi.present.report import comparison_tab
+
+        title, planet_radius = reporting.titled(source, source_name, scenario)
+        return comparison_tab(comparison, title=title, planet_radius=planet_radius, warning=warning)
+
+    return ending.give(comparison, lambda: rows(comparison), tab)
 
 
-def write_report(folder: str, comparison: Comparison, warning: str, title: str, planet_radius: float | None) -> str:
-    """Write the page of a comparison; returns its path."""
-    from piazzi.present.report import comparison_tab
-
-    return str(reporting.write(folder, [comparison_tab(comparison, title=title, planet_radius=planet_radius, warning=warning)]))
-
-
-def write(path: str, comparison: Comparison) -> None:
-    """Write the rows of a comparison as JSON or CSV."""
-    document = comparison.to_dict()
-    if path == output.STDOUT or path.lower().endswith(".json"):
-        output.write_json(path, document)
-    else:
-        output.write_csv(path, [{k: v for k, v in row.items() if not isinstance(v, list)} for row in document["rows"]])
+def rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """The rows of a comparison, their single values."""
+    return [{k: v for k, v in row.items() if not isinstance(v, list)} for row in comparison.to_dict()["rows"]]

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from piazzi.cli import options, output, reporting
-from piazzi.cli.running import DONE, NOT_ESTIMATED
+from piazzi.cli import options, reporting
+from piazzi.cli.ending import Ending
 
 if TYPE_CHECKING:
     from piazzi.evaluate import Observability
-
-ENDINGS = (".json", ".csv")
+    from piazzi.present.report import Tab
 
 
 @click.command(cls=options.Command)
@@ -48,8 +47,8 @@ def command(
       piazzi observability b612-range-q0 --add "b=atan2(y, x):sigma=0.01,angle"
       piazzi observability network.toml --add radar --json
     """
-    output.check_output(output_file, ENDINGS)
-    reporting.check(report)
+    ending = Ending(output_file, as_json, report)
+    ending.check()
     from piazzi.cli.additions import additions
     from piazzi.cli.sources import load_source
     from piazzi.evaluate import observability
@@ -58,30 +57,13 @@ def command(
     problem, tracking = source_found.problem, source_found.tracking
     add = additions(problem, added)
     found = observability(problem, tracking, add=add, twins=not no_twins, source=source_found.name)
-    if output_file is not None:
-        write(output_file, found)
-    if report is not None:
+
+    def tab() -> Tab:
         from piazzi.present.report import observability_tab
 
-        title, _ = reporting.titled(source, source_found.name, scenario)
-        report = str(reporting.write(report, [observability_tab(found, title=title)]))
-    if as_json:
-        if output_file != output.STDOUT:
-            output.print_json(found.to_dict())
-    elif output_file != output.STDOUT:
-        from piazzi.present.tables import heading
+        return observability_tab(found, title=reporting.titled(source, source_found.name, scenario)[0])
 
-        wrote = [f"Wrote {path}" for path in (output_file, report) if path]
-        output.print_rich(heading(problem, tracking, source_found.name), "", found, *wrote)
-    return DONE if found.success else NOT_ESTIMATED
-
-
-def write(path: str, found: Observability) -> None:
-    """Write everything as JSON, or the growth over time as CSV."""
-    if path == output.STDOUT or path.lower().endswith(".json"):
-        output.write_json(path, found.to_dict())
-    else:
-        output.write_csv(path, growth_rows(found))
+    return ending.give(found, lambda: growth_rows(found), tab)
 
 
 def growth_rows(found: Observability) -> list[dict[str, Any]]:

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 import click
 
 from piazzi.cli import options, output, reporting
-from piazzi.cli.running import DONE, NOT_ESTIMATED
+from piazzi.cli.ending import Ending
 
 if TYPE_CHECKING:
-    from piazzi.evaluate import WindowTrade
+    from piazzi.present.report import Tab
 
 DEFAULT = "1,2,5,10,20,50,100,200"
-ENDINGS = (".json", ".csv")
 _LARGEST = 1_000_000
 _LONG = 50_000  # epochs times states in windows from which a run takes long enough to show a bar
 
@@ -70,8 +69,8 @@ def command(
       piazzi windows b612-range --lags 1,5,20,100 --iterations 3 --json
       piazzi windows satellite-bearing -o windows.csv
     """
-    output.check_output(output_file, ENDINGS)
-    reporting.check(report)
+    ending = Ending(output_file, as_json, report)
+    ending.check()
     from piazzi.cli.sources import load_source
     from piazzi.evaluate import windows
     from piazzi.evaluate.window_trade import steps_of
@@ -81,27 +80,10 @@ def command(
     steps = steps_of(lags, tracking, graph=not no_graph)
     with output.progress(steps, long=len(tracking.times) * sum(lags) > _LONG) as step:
         trade = windows(problem, tracking, lags, iterations=iterations, graph=not no_graph, source=found.name, announce=step)
-    if output_file is not None:
-        write(output_file, trade)
-    if report is not None:
+
+    def tab() -> Tab:
         from piazzi.present.report import windows_tab
 
-        title, _ = reporting.titled(source, found.name, scenario)
-        report = str(reporting.write(report, [windows_tab(trade, title=title)]))
-    if as_json:
-        if output_file != output.STDOUT:
-            output.print_json(trade.to_dict())
-    elif output_file != output.STDOUT:
-        from piazzi.present.tables import heading
+        return windows_tab(trade, title=reporting.titled(source, found.name, scenario)[0])
 
-        wrote = [f"Wrote {path}" for path in (output_file, report) if path]
-        output.print_rich(heading(problem, tracking, found.name), "", trade, *wrote)
-    return DONE if trade.success else NOT_ESTIMATED
-
-
-def write(path: str, trade: WindowTrade) -> None:
-    """Write a window trade as JSON, or its rows as CSV."""
-    if path == output.STDOUT or path.lower().endswith(".json"):
-        output.write_json(path, trade.to_dict())
-    else:
-        output.write_csv(path, trade.records())
+    return ending.give(trade, trade.records, tab)
