@@ -104,6 +104,38 @@ def test_a_checkpoint_of_something_else_is_refused(measurements, tmp_path):
     assert "Traceback" not in damaged.stderr
 
 
+@pytest.mark.parametrize(
+    ("estimator", "key", "change", "words"),
+    [
+        ("ekf", "session_mean", lambda a: np.where(np.arange(4) == 2, np.nan, a), "'mean' is nan at 2; it must be finite"),
+        ("ekf", "session_x_pred", lambda a: a[:3], "'x_pred' has shape (3,); this problem needs (4,)"),
+        ("ekf", "session_covariance", lambda a: a + 9.0 * np.eye(4, k=1), "'covariance' is not symmetric: (x, y) is "),
+        ("ekf", "session_base_covariance", lambda a: -a, "'base_covariance' is not positive semidefinite: the variance of "),
+        ("window:5", "session_station", lambda a: a + 7, "'station' is 7 at 0; it must be a whole number from 0 to 0"),
+        ("window:5", "session_x", lambda a: a * np.inf, "'x' is "),
+        ("ukf", "session_clock", lambda a: a[::-1], "'clock' has an epoch at "),
+        ("ekf", "progress_lines", lambda a: np.nan, "progress 'lines' is nan; it must be a whole number, not below zero"),
+        ("ekf", "progress_written", lambda a: [1, 2], "progress 'written' is an array of shape (2,)"),
+        ("ekf", "progress_opening", lambda a: a[:7], "progress 'opening' has shape (7,) and type uint8; it is no digest"),
+    ],
+)
+def test_a_checkpoint_that_was_changed_is_one_clear_line(measurements, tmp_path, estimator, key, change, words):
+    _, _, lines = measurements
+    text, state, out = "\n".join(lines[:30]) + "\n", tmp_path / "state.npz", tmp_path / "out.csv"
+    command = ("-", "--with", estimator, "--checkpoint", state, "-o", out)
+    assert run(*command, text=text).returncode == 0
+    with np.load(state) as archive:
+        arrays = dict(archive)
+    np.savez(state, **arrays | {key: change(arrays[key])})
+    before = state.read_bytes(), out.read_bytes()
+    done = run(*command, text=text)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith(f"piazzi: {state}: the checkpoint's {words}")
+    assert (state.read_bytes(), out.read_bytes()) == before
+
+
 def test_a_stream_that_goes_on_is_taken_whole(measurements, tmp_path):
     """The first half, then the second half as a stream of its own: what a restarted sensor sends."""
     problem, tracking, lines = measurements

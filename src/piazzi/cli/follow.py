@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 BETWEEN_CHECKPOINTS = 0.05  # seconds: the file is synced to disk each time
 LONGEST_LINE = 2**16
-PROGRESS = ("lines", "consumed", "opening", "written")
 
 
 def follow(problem: Problem, estimator: Any, source: str, output: str | None, checkpoint: str | None, as_json: bool) -> int:
@@ -103,10 +102,13 @@ class _Run:
         check_writable(self.checkpoint)
         if not os.path.exists(self.checkpoint):
             return
-        session, progress = read_checkpoint(self.checkpoint, self.mark, self.session.saved_names, PROGRESS)
-        self.session.restore(session)
-        self.skip, self.written = int(progress["lines"]), int(progress["written"])
-        self.expected, self.opening = progress["consumed"].tobytes(), progress["opening"].tobytes()
+        session, progress = read_checkpoint(self.checkpoint, self.mark, self.session.saved_names)
+        try:
+            self.session.restore(session)
+        except ValueError as error:
+            raise ValueError(f"{self.checkpoint}: {error}") from None
+        self.skip, self.written = progress.lines, progress.written
+        self.expected, self.opening = progress.consumed, progress.opening
         self.resumed = True
 
     def save(self, force: bool = False) -> None:
@@ -114,15 +116,11 @@ class _Run:
         now = time.monotonic()
         if self.checkpoint is None or self.skip or not self.lines or not (force or now - self.saved_at > BETWEEN_CHECKPOINTS):
             return
-        from piazzi.io.checkpoint import write_checkpoint
+        from piazzi.io.checkpoint import Progress, write_checkpoint
 
-        as_numbers = {name: np.frombuffer(value, dtype=np.uint8) for name, value in self._digests().items()}
-        progress = {"lines": self.lines, "written": self.written, **as_numbers}
+        progress = Progress(self.lines, self.written, self.consumed.digest(), self.opening)
         write_checkpoint(self.checkpoint, self.mark, self.session.checkpoint(), progress)
         self.saved_at = time.monotonic()
-
-    def _digests(self) -> dict[str, bytes]:
-        return {"consumed": self.consumed.digest(), "opening": self.opening}
 
     # ---- the stream ----------------------------------------------------------------------------------------------
 

@@ -12,6 +12,7 @@ from piazzi import kernels
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.inputs import Inputs, scratch
 from piazzi.estimate.live import LiveFilter, checked_measurement
+from piazzi.estimate.saved import Saved
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
@@ -134,14 +135,6 @@ class GuardedLiveFilter(LiveFilter):
         return super().checkpoint() | {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
 
     def restore(self, saved: Mapping[str, Array]) -> None:
+        rows = Saved(saved, self.problem).measurements("epoch_values", "epoch_stations")
         super().restore(saved)
-        values, stations = (np.asarray(saved.get(name, ())) for name in ("epoch_values", "epoch_stations"))
-        m, known = self.problem.model.width, len(self.problem.stations)
-        if (
-            values.ndim != 2
-            or values.shape[1] != m
-            or stations.shape != (len(values),)
-            or not np.isin(stations, range(known)).all()
-        ):
-            raise ValueError("the checkpoint's measurements of its epoch do not fit this problem")
-        self._values, self._rows_of = np.array(values, dtype=float), np.array(stations, dtype=np.int64)
+        self._values, self._rows_of = rows

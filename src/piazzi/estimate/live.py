@@ -10,6 +10,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.considered import considered_names
 from piazzi.estimate.inputs import scratch
+from piazzi.estimate.saved import Saved
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.manoeuvres import check_after
@@ -202,19 +203,14 @@ class LiveFilter:
 
     def restore(self, saved: Mapping[str, Array]) -> None:
         """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
-        for name in (*_KEPT, "mean", "covariance", "clock"):
-            if name not in saved:
-                raise ValueError(f"the checkpoint has no {name!r}")
-        for name in (*_KEPT, "mean", "covariance"):
-            target = getattr(self, name if name in ("mean", "covariance") else "_" + name)
-            if np.shape(saved[name]) != target.shape:
-                raise ValueError(
-                    f"the checkpoint's {name!r} has shape {np.shape(saved[name])}; this problem needs {target.shape}"
-                )
-            target[...] = saved[name]
-        base, stands, measured = np.asarray(saved["clock"], dtype=float)
-        self._clock.time = None if np.isnan(base) else float(base)
-        self._predicted_to, self._measured = None if np.isnan(stands) else float(stands), bool(measured)
+        checked = Saved(saved, self.problem)
+        vectors, matrices = ("base_mean", "x_pred", "d", "mean"), ("base_covariance", "P_pred", "P", "covariance")
+        found = {name: checked.mean(name) for name in vectors} | {name: checked.covariance(name) for name in matrices}
+        found["times"] = checked.array("times", 4)
+        before, stands, (measured,) = checked.clock("clock", 3)
+        for name, value in found.items():
+            getattr(self, name if name in ("mean", "covariance") else "_" + name)[...] = value
+        self._clock.time, self._predicted_to, self._measured = before, stands, bool(measured)
 
 
 _KEPT = ("base_mean", "base_covariance", "x_pred", "P_pred", "d", "P", "times")

@@ -10,6 +10,7 @@ import numpy as np
 from piazzi.estimate.inputs import Inputs
 from piazzi.estimate.live import Clock, checked_measurement
 from piazzi.estimate.root import Root
+from piazzi.estimate.saved import Saved
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
@@ -104,19 +105,11 @@ class LiveRootFilter:
 
     def restore(self, saved: Mapping[str, Array]) -> None:
         """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
-        m, known = self.problem.model.width, len(self.problem.stations)
-        for name in self.saved_names:
-            if name not in saved:
-                raise ValueError(f"the checkpoint has no {name!r}")
-            wanted = (2,) if name == "clock" else getattr(self, name).shape if name in self._arrays else np.shape(saved[name])
-            if np.shape(saved[name]) != wanted:
-                raise ValueError(f"the checkpoint's {name!r} has shape {np.shape(saved[name])}; this problem needs {wanted}")
-        values, stations = np.asarray(saved["epoch_values"]), np.asarray(saved["epoch_stations"])
-        rows = len(stations) if stations.ndim == 1 else -1
-        if values.shape != (rows, m) or not np.isin(stations, range(known)).all():
-            raise ValueError("the checkpoint's measurements of its epoch do not fit this problem")
-        for name in self._arrays:
-            setattr(self, name, np.array(saved[name], dtype=float))
-        self._values, self._rows_of = np.array(values, dtype=float), stations.astype(np.int64)
-        base, stands = (None if np.isnan(v) else float(v) for v in np.asarray(saved["clock"], dtype=float))
-        self._clock.time, self.time = base, stands
+        checked, n = Saved(saved, self.problem), self.problem.model.n
+        base_mean, mean, covariance = checked.mean("base_mean"), checked.mean("mean"), checked.covariance("covariance")
+        base_root, root = checked.array("base_root", n, n), checked.array("root", n, n)
+        rows = checked.measurements("epoch_values", "epoch_stations")
+        before, stands, _ = checked.clock("clock", 2)
+        self.base_mean, self.base_root, self.root, self.mean, self.covariance = base_mean, base_root, root, mean, covariance
+        self._values, self._rows_of = rows
+        self._clock.time, self.time = before, stands

@@ -11,6 +11,7 @@ from piazzi import kernels
 from piazzi.estimate.live import Clock, checked_measurement
 from piazzi.estimate.losses import Loss
 from piazzi.estimate.robust_window import row_space, window_fragments
+from piazzi.estimate.saved import MOST_STEPS, Saved, check_order, check_steps
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
@@ -302,7 +303,9 @@ class LiveWindow:
         out = {name: np.array(getattr(self, "_" + name)) for name in _KEPT}
         W, J, m = len(self._t), len(self._z), self.problem.model.width
         if self._capacity[0]:
-            out |= {"nu_lin": self._nu_lin[: J * m].copy(), "H_lin": self._H_lin[: J * m].copy(), "dx": self._dx[:W].copy()}
+            nu = self._nu_lin[: J * m].copy()
+            H = np.where(np.isnan(nu)[:, None], 0.0, self._H_lin[: J * m])  # rows of what is missing were never written
+            out |= {"nu_lin": nu, "H_lin": H, "dx": self._dx[:W].copy()}
             out["oldest_covariance"] = self._late_covariance[0].copy()
         return out | {
             "mean": self.mean.copy(),
@@ -317,43 +320,38 @@ class LiveWindow:
         n, m = self.problem.model.n, self.problem.model.width
         # checkpoints of earlier versions have none
         saved = {"innovation": np.full(m, np.nan), "innovation_covariance": np.full((m, m), np.nan)} | dict(saved)
-        for name in (*_KEPT, "mean", "covariance"):
-            if name not in saved:
-                raise ValueError(f"the checkpoint has no {name!r}")
-        W, J = len(saved["t"]), len(saved["z"])
-        shapes = {
-            "m": (n,),
-            "P": (n, n),
-            "t": (W,),
-            "count": (W,),
-            "scale": (W,),
-            "first_row": (W + 1,),
-            "z": (J, m),
-            "station": (J,),
+        checked = Saved(saved, self.problem)
+        W, (z, station) = checked.length("t"), checked.measurements("z", "station")
+        J = len(z)
+        found = {
+            "m": checked.mean("m"),
+            "P": checked.covariance("P"),
+            "t": checked.array("t", W),
+            "count": checked.whole("count", W, 0, MOST_STEPS),
+            "scale": checked.array("scale", W),
+            "first_row": checked.whole("first_row", W + 1, 0, J),
+            "z": z,
+            "station": station,
+            "x": checked.array("x", W, n),
+            "x_before": checked.array("x_before", W, n),
         }
-        shapes |= {"x": (W, n), "x_before": (W, n), "mean": (n,), "covariance": (n, n)}
-        shapes |= {"innovation": (m,), "innovation_covariance": (m, m)}
-        shapes |= {"nu_lin": (J * m,), "H_lin": (J * m, n), "dx": (W, n), "oldest_covariance": (n, n)} if W else {}
-        for name, shape in shapes.items():
-            if name not in saved or np.shape(saved[name]) != shape:
-                found = np.shape(saved.get(name, ()))
-                raise ValueError(f"the checkpoint's {name!r} has shape {found}; this problem needs {shape}")
-        for name in _KEPT:
-            kind = np.int64 if name in ("count", "first_row", "station") else float
-            setattr(self, "_" + name, np.array(saved[name], dtype=kind))
-        if J and not (self._station.min() >= 0 and self._station.max() < len(self.problem.stations)):
-            raise ValueError("the checkpoint's 'station' names a station that this problem does not have")
-        steps = np.diff(self._first_row)
-        if self._first_row[0] != 0 or self._first_row[-1] != J or (steps < 0).any() or (W and (np.diff(self._t) <= 0).any()):
-            raise ValueError("the checkpoint's rows and times are not in order")
-        self.mean, self.covariance = np.array(saved["mean"], dtype=float), np.array(saved["covariance"], dtype=float)
-        self._newest = self.mean.copy(), self.covariance.copy()
-        self.innovation = np.array(saved["innovation"], dtype=float)
-        self.innovation_covariance = np.array(saved["innovation_covariance"], dtype=float)
+        check_order(found["t"], found["first_row"], J)
+        check_steps(found["t"], found["count"], found["scale"], self._clock.step)
+        mean, covariance = checked.mean("mean"), checked.covariance("covariance")
+        nu = checked.array("innovation", m, missing=True)
+        S = checked.array("innovation_covariance", m, m, missing=True)
+        if W:
+            linear = checked.array("nu_lin", J * m, missing=True), checked.array("H_lin", J * m, n), checked.array("dx", W, n)
+            oldest = checked.covariance("oldest_covariance")
+        for name in _KEPT:  # from here on, nothing can go wrong
+            setattr(self, "_" + name, found[name])
+        self.mean, self.covariance = mean, covariance
+        self._newest = mean.copy(), covariance.copy()
+        self.innovation, self.innovation_covariance = nu, S
         if W:
             self._buffers()
-            self._nu_lin[: J * m], self._H_lin[: J * m], self._dx[:W] = saved["nu_lin"], saved["H_lin"], saved["dx"]
-            self._late_covariance[0] = saved["oldest_covariance"]
+            self._nu_lin[: J * m], self._H_lin[: J * m], self._dx[:W] = linear
+            self._late_covariance[0] = oldest
 
 
 _KEPT = ("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before")
