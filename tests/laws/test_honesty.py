@@ -1,16 +1,17 @@
 """Tests of one run: on linear problems everything they rest on is known, and they reject a share of 5 % of matched runs."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
 from piazzi.evaluate.bounds import linearized, posterior_bounds
 from piazzi.evaluate.honesty import error_correlation, judged, own_innovations
 from piazzi.evaluate.metrics import nees
-from tests.laws.problems import linear, network, random_covariance, random_stable
+from tests.laws.problems import b612, linear, network, random_covariance, random_stable
 
 K = 5
 
@@ -152,6 +153,35 @@ def test_the_bound_of_a_nonlinear_problem_is_the_filters_covariance_at_the_truth
     sigma = np.sqrt(np.diagonal(estimate.covariance, axis1=1, axis2=2))
     difference = posterior_bounds(still, tracking).realtime - estimate.covariance
     assert np.abs(difference / (sigma[:, :, None] * sigma[:, None, :])).max() < 1e-6
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_bounds_are_the_same_bits_in_blocks_of_any_size(monkeypatch):
+    problem = two_stations()
+    tracking = drawn(problem)
+
+    def arrays():
+        found = linearized(problem, tracking, tracking.truth)
+        bounds = posterior_bounds(problem, tracking)
+        return [bounds.realtime, bounds.delayed, bounds.states, found.updated, found.whitened, found.states]
+
+    whole = arrays()
+    monkeypatch.setattr("piazzi.evaluate.bounds._BLOCK", 3)
+    for a, b in zip(whole, arrays(), strict=True):
+        assert_array_equal(a, b)
+
+
+def test_bounds_of_long_runs_take_little_more_memory_than_they_have_numbers():
+    problem, epochs = b612(), 100_000
+    tracking = pz.simulate(problem, np.arange(epochs) * 0.1, np.random.default_rng(0))
+    posterior_bounds(problem, pz.simulate(problem, np.arange(5) * 0.1, np.random.default_rng(0)))  # all modules are there
+    tracemalloc.start()
+    try:
+        bounds = posterior_bounds(problem, tracking)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 3 * (bounds.realtime.nbytes + bounds.delayed.nbytes + bounds.states.nbytes)
 
 
 @pytest.mark.usefixtures("uncompiled")

@@ -44,24 +44,36 @@ class Attempt:
 
 def attempts(problem: Problem, tracking: Tracking, twins: Sequence[Twin]) -> tuple[Attempt, ...]:
     """The filter and the graph on this tracking, from the problem's prior; empty where there is no truth to compare with."""
-    bounds, truth = posterior_bounds(problem, tracking), full_truth(problem, tracking)
-    if bounds is None or truth is None:
+    truth = full_truth(problem, tracking)
+    if truth is None:
+        return ()
+    half = slice(len(truth) // 2, None)
+    tried = {name: _last_half(estimator, problem, tracking) for name, estimator in TRIED.items()}
+    bounds = posterior_bounds(problem, tracking)  # after them: what needs much memory is not there at once
+    if bounds is None:
         return ()
     orbits = _orbits(problem, tracking, twins)
-    half = slice(len(truth) // 2, None)
     found = [Attempt("ekf at the truth", rms_in_sigmas(bounds.states[half] - truth[half], bounds.realtime[half]))]
-    for name, estimator in TRIED.items():
-        try:
-            estimate = estimator.estimate(problem, tracking)
-        except ValueError:
+    for name, result in tried.items():
+        if result is None:
             found.append(Attempt(name, np.inf))
             continue
-        bound = bounds.of(estimate.view)
-        excess = rms_in_sigmas(estimate.mean[half] - truth[half], bound[half])
-        distances = [rms_in_sigmas(estimate.mean[-1:] - x, bound[-1:]) for x in (truth[-1:], *orbits)]
+        mean, view = result
+        bound = bounds.of(view)
+        excess = rms_in_sigmas(mean - truth[half], bound[half])
+        distances = [rms_in_sigmas(mean[-1:] - x, bound[-1:]) for x in (truth[-1:], *orbits)]
         nearest = int(np.argmin(distances)) if np.isfinite(distances).any() else 0
         found.append(Attempt(name, excess, nearest - 1 if nearest else None))
     return tuple(found)
+
+
+def _last_half(estimator: Estimator, problem: Problem, tracking: Tracking) -> tuple[Array, str] | None:
+    """Means in the last half, and the estimate's view; None where it failed."""
+    try:
+        estimate = estimator.estimate(problem, tracking)
+    except ValueError:
+        return None
+    return estimate.mean[len(estimate.mean) // 2 :].copy(), estimate.view
 
 
 def _orbits(problem: Problem, tracking: Tracking, twins: Sequence[Twin]) -> list[Array]:

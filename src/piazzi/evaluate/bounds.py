@@ -9,9 +9,11 @@ import numpy as np
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
 from piazzi.estimate.factor_graph import DIFFUSE, with_first
-from piazzi.estimate.inputs import prepare, with_prior_node
+from piazzi.estimate.inputs import Inputs, prepare, with_prior_node
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+
+_BLOCK = 1 << 12  # epochs worked on at once: their matrices stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,31 +82,41 @@ def posterior_bounds(problem: Problem, tracking: Tracking) -> Bounds | None:
     truth = full_truth(problem, tracking)
     if truth is None:
         return None
-    found = linearized(problem, tracking, truth)
-    if not (np.isfinite(found.updated).all() and np.isfinite(found.smoothed).all()):
+    inputs = prepare(problem, tracking)
+    with np.errstate(all="ignore"):
+        chain, solver, skip = _solved(problem, inputs, truth)
+        smoothed = solver.marginals()
+        P, d = chain.P_pred[skip:], chain.d_pred[skip:]
+        _absorb(P, d, chain.nu, chain.H, inputs.first_row, np.empty_like(chain.nu))  # in place: long runs fill the memory
+    if not (np.isfinite(P).all() and np.isfinite(smoothed[skip:]).all()):
         return None
-    return Bounds(found.updated, found.smoothed, found.states)
+    return Bounds(P, smoothed[skip:], np.add(truth, d, out=d))
+
+
+def _solved(problem: Problem, inputs: Inputs, states: Array) -> tuple[Chain, Solver, int]:
+    """The chain linearised about states (K, n) and solved, and how many nodes are before its first epoch."""
+    nodes = with_prior_node(inputs)
+    chain = Chain(problem, nodes)
+    chain.x[:] = with_first(chain, states)
+    chain.linearize()
+    bordered = BorderedSolver.applies(problem) and bool(problem.model.constants)
+    solver: Solver = BorderedSolver(chain) if bordered else CovarianceSolver(chain)
+    solver.solve(0.0)
+    if not bordered and not solver.widest() <= DIFFUSE and BorderedSolver.applies(problem):
+        solver = BorderedSolver(chain)
+        solver.solve(0.0)
+    return chain, solver, nodes.epochs - inputs.epochs
 
 
 def linearized(problem: Problem, tracking: Tracking, states: Array) -> Linearized:
     """The problem linearised about these states, (K, n)."""
-    inputs = prepare(problem, tracking)
-    nodes = with_prior_node(inputs)
-    skip, M = nodes.epochs - inputs.epochs, problem.model.width
-    chain = Chain(problem, nodes)
-    chain.x[:] = with_first(chain, states)
+    inputs, M = prepare(problem, tracking), problem.model.width
     with np.errstate(all="ignore"):
-        chain.linearize()
-        bordered = BorderedSolver.applies(problem) and bool(problem.model.constants)
-        solver: Solver = BorderedSolver(chain) if bordered else CovarianceSolver(chain)
-        solver.solve(0.0)
-        if not bordered and not solver.widest() <= DIFFUSE and BorderedSolver.applies(problem):
-            solver = BorderedSolver(chain)
-            solver.solve(0.0)
+        chain, solver, skip = _solved(problem, inputs, states)
         smoothed, cross = solver.marginals(), solver.cross()
-        rows = np.diff(inputs.first_row)
         predicted, d = chain.P_pred[skip:], chain.d_pred[skip:]
-        whitened, updated, deviation = absorb(predicted, d, chain.nu, chain.H, inputs.first_row[:-1], rows)
+        whitened, updated, deviation = absorb(predicted, d, chain.nu, chain.H, inputs.first_row)
+    nodes = chain.inputs
     last = nodes.epochs - 1
     noise = chain.Q_all[:last] if problem.noise_varies else _scaled(problem, nodes.scale)
     return Linearized(
@@ -134,22 +146,35 @@ def _scaled(problem: Problem, scale: Array) -> Array:
     return np.asarray(scale[1:, None, None] * problem.process_noise.covariance)
 
 
-def absorb(P: Array, d: Array, nu: Array, H: Array, first_row: Array, rows: Array) -> tuple[Array, Array, Array]:
+def absorb(P: Array, d: Array, nu: Array, H: Array, first_row: Array) -> tuple[Array, Array, Array]:
     """Standardised innovations (J, m); covariances (K, n, n) and deviations (K, n) after the measurements of every epoch.
 
-    Scalars one after the other, of all epochs at once, so that rows of one epoch are whitened against each other too.
+    Scalars one after the other, of many epochs at once, so that rows of one epoch are whitened against each other too.
 
     Parameters
     ----------
     P, d : (K, n, n) and (K, n), predicted covariances and deviations
     nu, H : (J, m) and (J, m, n), innovations and Jacobians in units of the noise, NaN innovations where missing
-    first_row, rows : (K,), first row of each epoch and how many it has
+    first_row : (K + 1,), first row of each epoch
     """
-    M = nu.shape[1]
-    P, d = P.copy(), d.copy()
-    out = np.full_like(nu, np.nan)
+    P, d, out = P.copy(), d.copy(), np.empty_like(nu)
+    _absorb(P, d, nu, H, first_row, out)
+    return out, P, d
+
+
+def _absorb(P: Array, d: Array, nu: Array, H: Array, first_row: Array, out: Array) -> None:
+    """The same in place, block by block of epochs, so that the work space does not grow with them."""
+    out.fill(np.nan)
+    for start in range(0, len(P), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        ends = first_row[start : start + _BLOCK + 1]
+        part = slice(ends[0], ends[-1])
+        _absorb_block(P[block], d[block], nu[part], H[part], ends[:-1] - ends[0], np.diff(ends), out[part])
+
+
+def _absorb_block(P: Array, d: Array, nu: Array, H: Array, first_row: Array, rows: Array, out: Array) -> None:
     for slot in range(int(rows.max())):
-        for i in range(M):
+        for i in range(nu.shape[1]):
             k = np.flatnonzero(rows > slot)
             row = first_row[k] + slot
             there = ~np.isnan(nu[row, i])
@@ -163,4 +188,3 @@ def absorb(P: Array, d: Array, nu: Array, H: Array, first_row: Array, rows: Arra
             d[k] += e[:, None] * gain
             B = P_k - Ph[:, :, None] * gain[:, None, :]
             P[k] = B + gain[:, :, None] * (gain - np.einsum("ki,kij->kj", h, B))[:, None, :]
-    return out, P, d

@@ -131,7 +131,7 @@ def own_innovations(estimate: Estimate, found: Linearized | None) -> Array:
     P = np.swapaxes(found.Phi, 1, 2)
     ahead = np.concatenate([found.predicted[:1], found.Phi @ estimate.covariance[:-1] @ P + found.noise])
     rows = linearized_rows(estimate.problem, estimate.tracking, np.vstack([found.first, found.ahead]))
-    white = absorb(ahead, np.zeros_like(estimate.mean), *rows, inputs.first_row[:-1], np.diff(inputs.first_row))[0]
+    white = absorb(ahead, np.zeros_like(estimate.mean), *rows, inputs.first_row)[0]
     return np.where(np.isnan(nu), np.nan, white)
 
 
