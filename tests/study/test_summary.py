@@ -1,13 +1,19 @@
 """What a study says, against the same made from its runs by other means."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import piazzi as pz
+from piazzi.present.studies import columns
 from piazzi.study import run_study
+from piazzi.study.store import read_store
 from piazzi.study.summary import QUANTILES, wilson
+from tests.laws.problems import b612
+from tests.references.chi_square import mean_bounds
 from tests.study.estimators import Refusing
 from tests.study.studies import small
 
@@ -56,9 +62,44 @@ def test_bounds_of_mean_nees_hold_for_gaussian_errors():
     rng = np.random.default_rng(0)
     M, T, n = 40, 4000, 4
     nees = rng.chisquare(n, (M, T))
-    row = Row({}, np.ones(M, bool), np.zeros(M, bool), np.ones((M, T, 1)), nees)
-    inside = _course(row, n, np.ones((T, 1))).inside
+    row = Row({}, np.ones(M, bool), np.zeros(M, bool), np.ones((M, T, 1)), nees, np.full((M, T), n))
+    inside = _course(row, np.ones((T, 1))).inside
     assert inside == pytest.approx(0.99, abs=5 * np.sqrt(0.99 * 0.01 / T))
+
+
+def test_bounds_of_mean_nees_hold_for_ranks_that_differ():
+    """From run to run and from epoch to epoch; where there is no direction, there is no NEES."""
+    from piazzi.study.store import Row
+    from piazzi.study.summary import _course
+
+    rng = np.random.default_rng(1)
+    M, T = 10, 4000
+    rank = rng.integers(0, 4, (M, T))
+    rank[:, 0] = 0
+    nees = np.where(rank > 0, rng.chisquare(np.maximum(rank, 1)), np.nan)
+    course = _course(Row({}, np.ones(M, bool), np.zeros(M, bool), np.ones((M, T, 1)), nees, rank), np.ones((T, 1)))
+    assert course.inside == pytest.approx(0.99, abs=5 * np.sqrt(0.99 * 0.01 / T))
+    assert np.isnan(course.nees[0])
+    assert course.ideal == pytest.approx(2.0, abs=0.05)
+    assert course.band is None
+
+
+@pytest.mark.parametrize("rank", [2, 3])
+def test_a_singular_covariance_is_judged_by_its_rank(tmp_path, rank):
+    """Without process noise the covariance keeps the rank of the prior; errors this small are Gaussian."""
+    prior = pz.Gaussian.from_sigma([11, 0, 0, 10], np.where(np.arange(4) < rank, 1e-3, 0.0))
+    problem = b612(truth=None, prior=prior, process_noise=pz.ProcessNoise(np.zeros(4), "step"))
+    stored = run_study(small(runs=40, problem=problem, estimators=("ekf", "smoother"), epochs=20), tmp_path / "s.nc", workers=0)
+    low, high = mean_bounds(rank, 40, 0.01)
+    for line in stored.summary.lines:
+        assert line.course.ideal == rank
+        assert line.course.band == pytest.approx((low, high), rel=0.01)
+        assert low < line.mean_nees < high
+        assert line.course.inside > 0.9
+    assert next(c.unit for c in columns(stored.summary) if c.title == "mean NEES") == f"ideal {rank}"
+    document = json.loads(json.dumps(stored.summary.to_dict(), allow_nan=False))
+    assert document["rows"][0]["nees_bounds"] == pytest.approx([low, high], rel=0.01)
+    assert document["rows"][0]["nees_ideal"] == rank
 
 
 @pytest.mark.parametrize("count", [0, 1, 10, 99, 100])
@@ -88,6 +129,15 @@ def test_json_is_strict_and_complete(stored):
     assert len(row["over_time"]["position"]["quantiles"]) == 3
     assert len(row["over_time"]["nees"]) == len(document["times"]) == 30
     assert document["messages"][0]["estimator"] == "picky"
+
+
+def test_a_store_of_an_earlier_version_is_taken_as_of_full_rank(stored, tmp_path):
+    import h5py
+
+    old = shutil.copy(stored.path, tmp_path / "old.nc")
+    with h5py.File(old, "r+") as file:
+        del file["rank"]
+    assert json.dumps(read_store(old).summary.to_dict()) == json.dumps(stored.summary.to_dict())
 
 
 def test_any_netcdf_reader_opens_a_store(stored):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, number, printable, unit_of
+from piazzi.problem.checks import Array
 from piazzi.study import Line, Stored, Summary
 
 if TYPE_CHECKING:
@@ -36,10 +39,21 @@ def point_name(point: Mapping[str, Any]) -> str:
     return printable(", ".join(f"{name} = {value}" for name, value in point.items()))
 
 
+def ideal_nees(lines: Sequence[Line]) -> str:
+    """What the mean NEES should be: how many directions of the error have any variance."""
+    found = sorted({float(f"{x.course.ideal:.2g}") for x in lines if x.course.ideal is not None})
+    return f"ideal {' to '.join(f'{v:g}' for v in dict.fromkeys((found[0], found[-1]))) if found else NOTHING}"
+
+
+def widest_bounds(lines: Sequence[Line]) -> Array | None:
+    """Bounds of the mean NEES (2, T), of the line whose are the widest; None where no line has any."""
+    found = [x.course.nees_bounds for x in lines if np.isfinite(x.course.nees_bounds).any()]
+    return max(found, key=lambda b: float(np.nanmean(b[1] - b[0])), default=None)
+
+
 def columns(summary: Summary) -> list[Column]:
     """Everything the table shows."""
     lines, stored = summary.lines, summary.stored
-    n = len(stored.about["states"])
     found = [Column(printable(axis), "", tuple(str(line.point[axis]) for line in lines)) for axis in stored.about["axes"]]
     found += [
         Column("estimator", "", tuple(printable(line.estimator) for line in lines)),
@@ -55,7 +69,7 @@ def columns(summary: Summary) -> list[Column]:
         found.append(Column(f"{name} RMSE over bound", "ideal 1", ratios, False))
     inside = tuple(NOTHING if (i := x.course.inside) is None else f"{100 * i:.0f} %" for x in lines)
     found += [
-        Column("mean NEES", f"ideal {n}", tuple(number(line.mean_nees_last_half, 3) for line in lines)),
+        Column("mean NEES", ideal_nees(lines), tuple(number(line.mean_nees_last_half, 3) for line in lines)),
         Column("median NEES", "last half", tuple(number(line.median_nees_last_half, 3) for line in lines), False),
         Column("NEES in 99 % bounds", "of epochs", inside, False),
         Column("mean NIS", "", tuple(number(line.mean_nis, 3) for line in lines), False),

@@ -104,6 +104,7 @@ def _piece(task: Task, found: list[tuple[Scored, list[str]]]) -> Piece:
         "diverged": np.stack([scored.diverged for scored, _ in found]).astype(np.uint8),
         "error": np.stack([scored.error for scored, _ in found]).astype(np.float32),
         "nees": np.stack([scored.nees for scored, _ in found]).astype(np.float32),
+        "rank": np.stack([scored.rank for scored, _ in found]).astype(np.uint8),
     }
     messages = [(row, task.first + i, text) for row, (_, texts) in enumerate(found) for i, text in enumerate(texts) if text]
     return Piece(task, arrays, tuple(messages))
@@ -225,7 +226,7 @@ def _one(study: Study, label: str, estimator: Any, runs: _Runs, i: int) -> dict[
 def _copy(source: Scored, i: int | slice, target: Scored, j: int | slice) -> None:
     for name, values in target.numbers.items():
         values[j] = source.numbers[name][i]
-    for field in ("success", "diverged", "error", "nees"):
+    for field in ("success", "diverged", "error", "nees", "rank"):
         getattr(target, field)[j] = getattr(source, field)[i]
 
 

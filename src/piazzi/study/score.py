@@ -35,6 +35,7 @@ class Scored:
     success, diverged : (M,) bool
     error : (M, T, G), length of the error at the epochs that are kept
     nees : (M, T)
+    rank : (M, T), how many directions `nees` sums over, zero where it is not known
     """
 
     numbers: dict[str, Array]
@@ -42,13 +43,16 @@ class Scored:
     diverged: Array
     error: Array
     nees: Array
+    rank: Array
 
 
 def nothing(runs: int, groups: int, kept: int) -> Scored:
     """Runs without results."""
     numbers = {name: np.full((runs, groups) if grouped else runs, np.nan) for name, grouped in NUMBERS.items()}
     no = np.zeros(runs, dtype=bool)
-    return Scored(numbers, no, no.copy(), np.full((runs, kept, groups), np.nan), np.full((runs, kept), np.nan))
+    return Scored(
+        numbers, no, no.copy(), np.full((runs, kept, groups), np.nan), np.full((runs, kept), np.nan), np.zeros((runs, kept))
+    )
 
 
 def score_lanes(scores: Scores, n: int, kept: Array, seconds: float) -> Scored:
@@ -72,7 +76,7 @@ def score_lanes(scores: Scores, n: int, kept: Array, seconds: float) -> Scored:
     else:
         diverged[:] = False
     error = np.sqrt(squared[:, :, kept]).transpose(0, 2, 1)
-    return Scored(numbers, np.ones(M, dtype=bool), diverged, error, scores.nees[:, kept])
+    return Scored(numbers, np.ones(M, dtype=bool), diverged, error, scores.nees[:, kept], np.full((M, len(kept)), n))
 
 
 def _root_mean(squared: Array) -> Array:
@@ -92,7 +96,8 @@ def score_estimate(name: str, estimate: Estimate, groups: dict[str, tuple[int, .
     if error is not None and truth is not None:
         part = error[kept]
         out.error[0] = np.stack([np.sqrt((part[:, list(c)] ** 2).sum(axis=1)) for c in groups.values()], axis=1)
-        out.nees[0] = squared_in_sigmas(part, estimate.covariance[kept], ~np.isnan(truth[kept])).value
+        found = squared_in_sigmas(part, estimate.covariance[kept], ~np.isnan(truth[kept]))
+        out.nees[0], out.rank[0] = found.value, found.rank
     return out, row.message
 
 

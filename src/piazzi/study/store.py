@@ -36,6 +36,7 @@ class Row:
     diverged: Array
     error: Array
     nees: Array
+    rank: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +77,12 @@ class Stored:
         """Results of all runs; raises OSError, ValueError."""
         with hdf5.opened(self.path) as root:
             found = {name: hdf5.slab(root, name, (point, row)) for name in (*NUMBERS, "success", "diverged", "error", "nees")}
+            rank = hdf5.slab(root, "rank", (point, row)) if "rank" in root else None
+        if rank is None:  # of an earlier version, for which every covariance was of full rank
+            rank = np.full(found["nees"].shape, len(self.about["states"]))
         success, diverged = (found.pop(name).astype(bool) for name in ("success", "diverged"))
         error, nees = found.pop("error"), found.pop("nees")
-        return Row(found, success, diverged, error, nees)
+        return Row(found, success, diverged, error, nees, rank)
 
     def bound(self, point: int, view: str) -> tuple[Array, Array, int]:
         """Cramer-Rao bounds as standard deviations: at the epochs that are kept (T, G), and over the last half (G,).
@@ -171,6 +175,7 @@ def _create(file: Any, study: Study) -> None:
         _variable(file, name, per_run, "u1", (1, 1, together), 0)
     _variable(file, "error", (*per_run, "epoch", "group"), "f4", (1, 1, min(study.runs, 32), T, G), np.nan)
     _variable(file, "nees", (*per_run, "epoch"), "f4", (1, 1, min(study.runs, 64), T), np.nan)
+    _variable(file, "rank", (*per_run, "epoch"), "u1", (1, 1, min(study.runs, 64), T), 0)
     _variable(file, "bound", ("point", "view", "epoch", "group"), "f4", (1, 2, T, G), np.nan)
     for name in ("bound_whole", "bound_last_half"):
         _variable(file, name, ("point", "view", "group"), "f8", (1, 2, G), np.nan)

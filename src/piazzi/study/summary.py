@@ -31,24 +31,40 @@ class Course:
     quantiles : (3, T, G), length of the error over runs at `QUANTILES`
     rms : (T, G), root mean square over runs
     bound : (T, G), Cramer-Rao bound, NaN where unknown
-    nees : (T,), mean over runs
-    nees_bounds : (2,), where that mean lies at one epoch with a probability of `NEES_CONFIDENCE` if errors are Gaussian with
-        the covariance that the estimator gives
+    nees : (T,), mean over runs, NaN where none has one
+    rank : (T,), mean number of directions that the NEES of a run sums over: the mean NEES of errors that are as they should
+    nees_bounds : (2, T), where the mean NEES lies at one epoch with a probability of `NEES_CONFIDENCE` if errors are Gaussian
+        with the covariance that the estimator gives, be it singular
     """
 
     quantiles: Array
     rms: Array
     bound: Array
     nees: Array
-    nees_bounds: tuple[float, float]
+    rank: Array
+    nees_bounds: Array
 
     @property
     def inside(self) -> float | None:
         """Share of the epochs at which the mean NEES is within its bounds."""
-        known = self.nees[np.isfinite(self.nees)]
-        if not known.size:
+        known = np.isfinite(self.nees)
+        if not known.any():
             return None
-        return float(((known >= self.nees_bounds[0]) & (known <= self.nees_bounds[1])).mean())
+        low, high = self.nees_bounds
+        return float(((self.nees >= low) & (self.nees <= high))[known].mean())
+
+    @property
+    def ideal(self) -> float | None:
+        """Mean over the epochs of what the mean NEES should be."""
+        return _mean(self.rank[self.rank > 0])
+
+    @property
+    def band(self) -> tuple[float, float] | None:
+        """The bounds where they are the same at every epoch that has some."""
+        known = self.nees_bounds[:, np.isfinite(self.nees_bounds).all(axis=0)]
+        if not known.size or (known != known[:, :1]).any():
+            return None
+        return float(known[0, 0]), float(known[1, 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,10 +112,12 @@ class Line:
             "diverged_interval": None if self.diverged_interval is None else list(self.diverged_interval),
             **{k: {g: list(v) if isinstance(v, tuple) else v for g, v in getattr(self, k).items()} for k in groups},
             **{k: getattr(self, k) for k in numbers},
-            "nees_bounds": list(c.nees_bounds),
+            "nees_bounds": None if c.band is None else list(c.band),
             "nees_inside": c.inside,
+            "nees_ideal": c.ideal,
             "over_time": {
                 "nees": plain(c.nees),
+                "nees_bounds": plain(c.nees_bounds),
                 **{
                     g: {
                         "quantiles": plain(c.quantiles[:, :, i]),
@@ -160,7 +178,7 @@ class Summary:
 
 def _line(stored: Stored, point: dict[str, Any], index: int, row: int) -> Line:
     found, (label, view) = stored.row(index, row), stored.rows[row]
-    good, n, groups = found.success, len(stored.about["states"]), stored.groups
+    good, groups = found.success, stored.groups
     bound, bound_last_half, same = stored.bound(index, view)
     done = int(good.sum())
     lost = int((found.diverged & good).sum())
@@ -184,19 +202,35 @@ def _line(stored: Stored, point: dict[str, Any], index: int, row: int) -> Line:
         _mean(found.numbers["mean_nis"][good]),
         _mean(found.numbers["seconds"][good]),
         _mean(found.numbers["iterations"][good]),
-        _course(found, n, bound),
+        _course(found, bound),
     )
 
 
-def _course(row: Row, n: int, bound: Array) -> Course:
-    error, nees = row.error[row.success].astype(float), row.nees[row.success].astype(float)
+def _course(row: Row, bound: Array) -> Course:
+    error, nees, rank = (a[row.success].astype(float) for a in (row.error, row.nees, row.rank))
     M, (T, G) = len(error), row.error.shape[1:]
     if not M:
-        nothing = np.full((T, G), np.nan)
-        return Course(np.full((len(QUANTILES), T, G), np.nan), nothing, bound, np.full(T, np.nan), (0.0, 0.0))
-    low, high = epoch_bounds(np.array([n]), M, NEES_CONFIDENCE)
-    bounds = (float(low[0]), float(high[0]))
-    return Course(np.quantile(error, QUANTILES, axis=0), np.sqrt((error**2).mean(axis=0)), bound, nees.mean(axis=0), bounds)
+        nothing, none = np.full((T, G), np.nan), np.full(T, np.nan)
+        return Course(np.full((len(QUANTILES), T, G), np.nan), nothing, bound, none, np.zeros(T), np.full((2, T), np.nan))
+    quantiles, rms = np.quantile(error, QUANTILES, axis=0), np.sqrt((error**2).mean(axis=0))
+    return Course(quantiles, rms, bound, *_nees(nees, rank))
+
+
+def _nees(nees: Array, rank: Array) -> tuple[Array, Array, Array]:
+    """Mean NEES over the runs (M, T) that have one, its expectation, and its bounds, (T,), (T,) and (2, T).
+
+    A sum of independent chi-square variables is one, of as many degrees of freedom as they have together.
+    """
+    known = rank > 0
+    count, total = known.sum(axis=0), rank.sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        mean = np.where(known, nees, 0.0).sum(axis=0) / count
+    bounds, expected = np.full((2, len(count)), np.nan), np.zeros(len(count))
+    for runs in np.unique(count[count > 0]).tolist():
+        there = count == runs
+        expected[there] = total[there] / runs
+        bounds[:, there] = epoch_bounds(expected[there], runs, NEES_CONFIDENCE)
+    return mean, expected, bounds
 
 
 def wilson(count: int, of: int) -> tuple[float, float] | None:

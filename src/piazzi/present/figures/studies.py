@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from piazzi.evaluate.quantities import printable
 from piazzi.present.figures.pages import save
 from piazzi.present.figures.style import RC, label_of, line_of, plain, plain_ticks, time_axis
-from piazzi.present.studies import group_display, point_name
+from piazzi.present.studies import group_display, ideal_nees, point_name, widest_bounds
 from piazzi.study import Line, Summary
 
 if TYPE_CHECKING:
@@ -81,13 +81,14 @@ def nees_page(summary: Summary, lines: list[Line]) -> Figure:
     for line in lines:
         style = line_of(line.estimator, line.view, names)
         ax.plot(stored.times * unit.factor, line.course.nees, label=label_of(line.estimator, line.view), **style)
-    widest = max((line.course.nees_bounds for line in lines), key=lambda b: b[1] - b[0])
-    ax.axhspan(*widest, color="#BBBBBB", alpha=0.5, label="99 % bounds")
+    widest = widest_bounds(lines)
+    if widest is not None:
+        ax.fill_between(stored.times * unit.factor, *widest, color="#BBBBBB", alpha=0.5, label="99 % bounds")
     ax.set_yscale("log")
     plain_ticks(ax)
     ax.set_ylabel("mean NEES over runs")
     ax.legend(ncols=3, fontsize=7)
-    _title(figure, summary, lines, f"ideal {len(stored.about['states'])}")
+    _title(figure, summary, lines, ideal_nees(lines))
     return figure
 
 

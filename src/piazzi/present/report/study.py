@@ -10,7 +10,7 @@ from piazzi.evaluate.quantities import Display, number, printable
 from piazzi.present.colours import dash_of, label_of, shades
 from piazzi.present.figures.style import time_display
 from piazzi.present.report.blocks import Axis, Chart, Key, Line, Point, Section, Tab, Table, Text
-from piazzi.present.studies import columns, failures, group_display, heading, point_name
+from piazzi.present.studies import columns, failures, group_display, heading, ideal_nees, point_name, widest_bounds
 from piazzi.problem.checks import Array
 from piazzi.study import Line as Result
 from piazzi.study import Summary
@@ -51,7 +51,7 @@ def _tab(summary: Summary, index: int, title: str) -> Tab:
         _points(summary, lines),
         [
             Section("How far off", charts, "Over all runs that did not fail, at each epoch."),
-            Section("Are they honest?", [_nees(lines, keys, axis, len(stored.about["states"]))]),
+            Section("Are they honest?", [_nees(lines, keys, axis, stored.times)]),
             _table(summary, index, rows),
             Section("How to read this", [Text([*_READING, *failures(summary)])]),
         ],
@@ -86,15 +86,18 @@ def _errors(summary: Summary, lines: Sequence[Result], keys: Sequence[Key], axis
     return out
 
 
-def _nees(lines: Sequence[Result], keys: Sequence[Key], axis: Axis, n: int) -> Chart:
-    drawn = [
-        Line(np.linspace(axis.low or 0.0, axis.high or 1.0, len(line.course.nees)), line.course.nees, keys[k].label, k)
-        for k, line in enumerate(lines)
-    ]
-    low, high = max((line.course.nees_bounds for line in lines), key=lambda b: b[1] - b[0])
-    bottom, top = _limits([*(line.course.nees for line in lines), np.array([low, high])])
+def _nees(lines: Sequence[Result], keys: Sequence[Key], axis: Axis, times: Array) -> Chart:
+    drawn = [Line(times, line.course.nees, keys[k].label, k) for k, line in enumerate(lines)]
+    widest = widest_bounds(lines)
+    bounds = np.full((2, 1), np.nan) if widest is None else widest
+    bottom, top = _limits([*(line.course.nees for line in lines), bounds.ravel()])
+    ranges: list[tuple[float, float, str]] = []
+    if np.isfinite(bounds).all() and (bounds == bounds[:, :1]).all():
+        ranges = [(float(bounds[0, 0]), float(bounds[1, 0]), "")]
+    elif widest is not None:
+        drawn += [Line(times, edge, "99 % bound", dash=(2, 2)) for edge in widest]
     y = Axis("mean NEES", Display(""), "log", bottom, top)
-    return Chart(f"Mean NEES over runs, ideal {n}", axis, y, drawn, ranges=[(low, high, "")], column="mean NEES")
+    return Chart(f"Mean NEES over runs, {ideal_nees(lines)}", axis, y, drawn, ranges=ranges, column="mean NEES")
 
 
 def _limits(series: Sequence[Array]) -> tuple[float, float]:
