@@ -38,7 +38,7 @@ def command(folder: str, kind: str, seed: int) -> int:
     """
     target = Path(folder)
     for name in PROBLEMS:
-        _make_folder(target / name)
+        output.make_folder(target / name)
     from piazzi.present.report import comparison_tab
     from piazzi.scenarios import load_scenario
 
@@ -55,14 +55,6 @@ def command(folder: str, kind: str, seed: int) -> int:
         _print(comparison, scenario)
     _conclude([*wrote, reporting.write(str(target), tabs)], target)
     return DONE if success else NOT_ESTIMATED
-
-
-def _make_folder(folder: Path) -> None:
-    """Make the folder, or say that it cannot be, before anything is computed."""
-    from piazzi.io.atomic import check_writable
-
-    folder.mkdir(parents=True, exist_ok=True)
-    check_writable(folder / "comparison.json")
 
 
 def _estimated(scenario: Scenario, seed: int, step: Callable[[str], None]) -> Comparison:

@@ -16,6 +16,7 @@ from typing import IO, TYPE_CHECKING, Any
 import click
 import numpy as np
 
+from piazzi.cli.output import check_place
 from piazzi.cli.running import DONE, say
 from piazzi.cli.sources import STDIN
 
@@ -46,6 +47,8 @@ def follow(problem: Problem, estimator: Any, source: str, output: str | None, ch
         run.sink = _sink(stack, output, run.written)
         try:
             run.consume(stream)
+        except ValueError as error:
+            raise ValueError(f"{'standard input' if source == STDIN else source}: {error}") from None
         finally:
             run.save(force=True)
     say(run.summary())
@@ -96,10 +99,9 @@ class _Run:
         """Take up a checkpoint where there is one."""
         if self.checkpoint is None:
             return
-        from piazzi.io.atomic import check_writable
         from piazzi.io.checkpoint import read_checkpoint
 
-        check_writable(self.checkpoint)
+        check_place(self.checkpoint)
         if not os.path.exists(self.checkpoint):
             return
         session, progress = read_checkpoint(self.checkpoint, self.mark, self.session.saved_names)

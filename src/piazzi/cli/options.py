@@ -11,9 +11,22 @@ import click
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+
+class WholeNumber(click.IntRange):
+    """A whole number in a range, by that name where it is refused."""
+
+    name = "whole number"
+
+
+class Number(click.types.FloatParamType):
+    """A number, by that name where it is refused."""
+
+    name = "number"
+
+
 source = click.argument("source", metavar="SOURCE")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, and nothing else there.")
-seed = click.option("--seed", type=click.IntRange(0), metavar="N", default=0, show_default=True, help="Seed of simulation.")
+seed = click.option("--seed", type=WholeNumber(0), metavar="N", default=0, show_default=True, help="Seed of simulation.")
 scenario = click.option("--scenario", metavar="NAME", help="Scenario that a .csv or the CSV on standard input measures.")
 
 

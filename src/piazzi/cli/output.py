@@ -64,6 +64,11 @@ def check_output(path: str | None, endings: Sequence[str]) -> None:
         return
     if Path(path).suffix.lower() not in endings:
         raise click.UsageError(f"-o {path}: the file must end in {', '.join(endings)}", click.get_current_context(silent=True))
+    check_place(path)
+
+
+def check_place(path: str) -> None:
+    """Raise OSError where no file can be written at `path`.  Nothing is changed."""
     from piazzi.io.atomic import check_writable
 
     check_writable(path)
@@ -74,6 +79,18 @@ def check_output(path: str | None, endings: Sequence[str]) -> None:
                 pass  # some folders refuse files whatever their permissions say
         except OSError as error:
             raise type(error)(error.errno, f"cannot be written: {error.strerror}", path) from None
+
+
+def make_folder(path: str | os.PathLike[str]) -> None:
+    """Make a folder, unless it is there; raises OSError where there can be none, or no file in it."""
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise NotADirectoryError(error.errno, "no folder can be made there: a file is in the way", os.fspath(path)) from None
+    except OSError as error:
+        raise type(error)(error.errno, f"no folder can be made there: {error.strerror}", os.fspath(path)) from None
+    check_place(os.fspath(folder / "piazzi"))
 
 
 def write_json(path: str, value: Any) -> None:

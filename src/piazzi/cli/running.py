@@ -71,8 +71,9 @@ def _told(error: Exception) -> tuple[int, str]:
         case click.UsageError():
             path = error.ctx.command_path if error.ctx else "piazzi"
             where = path.removeprefix("piazzi").strip()
-            text = error.format_message().rstrip(".")
-            text = text[:1].lower() + text[1:]
+            text = error.format_message()
+            text = text if text.endswith("...") else text.removesuffix(".")
+            text = text if text[:2].isupper() else text[:1].lower() + text[1:]
             return BAD_INPUT, f"{where + ': ' if where else ''}{text} (see {path} --help)"
         case click.ClickException():
             return BAD_INPUT, error.format_message()

@@ -21,14 +21,18 @@ ENDINGS = (".nc",)
 
 @click.command(cls=options.WithEstimators)
 @click.argument("scenario", metavar="SCENARIO")
-@click.option("--runs", type=click.IntRange(1), metavar="N", help="Runs at every point.  [default: the scenario's, or 100]")
+@click.option(
+    "--runs", type=options.WholeNumber(1), metavar="N", help="Runs at every point.  [default: the scenario's, or 100]"
+)
 @options.estimators("the scenario's, or ekf")
 @click.option("--vary", multiple=True, metavar="NAME=V,V,...", help="Vary this; repeatable, for a grid.  See above.")
 @options.output("Keep all runs in this .nc file.")
 @click.option("--resume", is_flag=True, help="Go on with what FILE has of this study.")
-@click.option("--workers", type=click.IntRange(0), metavar="N", help="Processes; 0 is this one.  [default: one per processor]")
+@click.option(
+    "--workers", type=options.WholeNumber(0), metavar="N", help="Processes; 0 is this one.  [default: one per processor]"
+)
 @click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler, tcp://host:8786, or 'local' to start a cluster here.")
-@click.option("--chunk", type=click.IntRange(1), metavar="N", help="Runs per task.  [default: about a second's]")
+@click.option("--chunk", type=options.WholeNumber(1), metavar="N", help="Runs per task.  [default: about a second's]")
 @click.option("--figures", metavar="FOLDER", help="Write pictures there.")
 @reporting.option
 @options.as_json
@@ -69,6 +73,9 @@ def command(
     if resume and output_file is None:
         raise click.UsageError("--resume needs -o FILE, the study to go on with", click.get_current_context())
     reporting.check(report)
+    if figures is not None:
+        output.make_folder(figures)
+    _check_scenario(scenario)
     study = _study(scenario, runs, names, vary, seed)
     say(_size(study), prefix="")
     run = {"resume": resume, "workers": workers, "scheduler": scheduler, "chunk": chunk}
@@ -92,6 +99,16 @@ def command(
 
             output.print_rich(heading(stored), "", StudyTable(summary), *failures(summary), *wrote)
     return DONE if summary.success else NOT_ESTIMATED
+
+
+def _check_scenario(scenario: str) -> None:
+    """Refuse what is no scenario at a glance: a recording has one run only."""
+    from piazzi.io.files import RECORDINGS
+
+    if not scenario:
+        raise click.UsageError("SCENARIO is empty", click.get_current_context())
+    if scenario.lower().endswith(RECORDINGS):
+        raise click.UsageError(f"{scenario}: a study simulates; name a scenario, not a recording", click.get_current_context())
 
 
 def _study(scenario: str, runs: int | None, names: tuple[str, ...], vary: tuple[str, ...], seed: int) -> Study:

@@ -36,7 +36,7 @@ def whole_numbers(context: click.Context, parameter: click.Parameter, text: str)
 )
 @click.option(
     "--iterations",
-    type=click.IntRange(1, 1000),
+    type=options.WholeNumber(1, 1000),
     metavar="N",
     default=1,
     show_default=True,

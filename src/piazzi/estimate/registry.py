@@ -190,9 +190,11 @@ def parse(text: str) -> Estimator:
     ValueError
         For an unknown name (with the nearest one) or options that the estimator does not have.
     """
-    name, _, option = text.strip().partition(":")
+    name, colon, option = text.strip().partition(":")
     if name not in ESTIMATORS:
         raise ValueError(f"unknown estimator {text!r}{nearest(name, ESTIMATORS)}")
+    if colon and not option:
+        raise ValueError(f"estimator {text!r}: nothing follows the colon; write {ESTIMATORS[name].syntax}")
     try:
         return ESTIMATORS[name].build(option)
     except ValueError as error:
