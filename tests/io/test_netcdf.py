@@ -197,6 +197,10 @@ def virtual(root):
     ("change", "says"),
     [
         (said("about", lambda a: a.update(format="other/1")), "its format is 'other/1'"),
+        (
+            said("about", lambda a: (a.pop("format"), a.update(schema="piazzi.study/1"))),
+            "it holds no measurements: its schema is 'piazzi.study/1'",
+        ),
         (said("about", lambda a: a.update(epoch=3)), "about.epoch: must be text"),
         (said("problem", "{"), "variable 'problem' is not JSON"),
         (said("problem", "[]"), "variable 'problem' is not a JSON object"),

@@ -38,7 +38,7 @@ def command(folder: str, kind: str, seed: int) -> int:
     """
     target = Path(folder)
     for name in PROBLEMS:
-        output.make_folder(target / name)
+        output.make_folder(target / name, "comparison.json")
     from piazzi.present.report import comparison_tab
     from piazzi.scenarios import load_scenario
 

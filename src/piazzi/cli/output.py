@@ -81,8 +81,8 @@ def check_place(path: str) -> None:
             raise type(error)(error.errno, f"cannot be written: {error.strerror}", path) from None
 
 
-def make_folder(path: str | os.PathLike[str]) -> None:
-    """Make a folder, unless it is there; raises OSError where there can be none, or no file in it."""
+def make_folder(path: str | os.PathLike[str], file: str) -> None:
+    """Make a folder, unless it is there; raises OSError where there can be none, or this file cannot be written in it."""
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -90,7 +90,7 @@ def make_folder(path: str | os.PathLike[str]) -> None:
         raise NotADirectoryError(error.errno, "no folder can be made there: a file is in the way", os.fspath(path)) from None
     except OSError as error:
         raise type(error)(error.errno, f"no folder can be made there: {error.strerror}", os.fspath(path)) from None
-    check_place(os.fspath(folder / "piazzi"))
+    check_place(os.fspath(folder / file))
 
 
 def write_json(path: str, value: Any) -> None:

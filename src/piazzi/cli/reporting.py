@@ -37,7 +37,7 @@ def check(path: str | None) -> None:
     from piazzi.present.report.write import page_path
 
     target = page_path(path)
-    output.make_folder(target.parent)
+    output.make_folder(target.parent, target.name)
     output.check_output(str(target), ENDINGS)
 
 

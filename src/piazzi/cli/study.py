@@ -74,7 +74,7 @@ def command(
         raise click.UsageError("--resume needs -o FILE, the study to go on with", click.get_current_context())
     reporting.check(report)
     if figures is not None:
-        output.make_folder(figures)
+        output.make_folder(figures, "study-nees.png")
     _check_scenario(scenario)
     study = _study(scenario, runs, names, vary, seed)
     say(_size(study), prefix="")

@@ -111,7 +111,8 @@ def _content(root: Any) -> tuple[Problem, Tracking]:
     faults = Faults()
     about = Table(hdf5.document(root, "about"), "about", faults)
     if about.text("format") != FORMAT:
-        raise ValueError(f"its format is {shown(about.raw('format'))}; Piazzi reads {FORMAT!r}")
+        kind = "format" if about.raw("format") is not None else "schema"  # a study has one, and no measurements
+        raise ValueError(f"it holds no measurements: its {kind} is {shown(about.raw(kind))}; Piazzi reads {FORMAT!r}")
     name, epoch, named = about.text("name", ""), about.text("epoch", ""), about.flag("stations_named", False)
     _raise_first(faults)
     problem = problem_from_tables(hdf5.document(root, "problem"), name or "", "variable 'problem'")
