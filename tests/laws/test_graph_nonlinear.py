@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.kernels.spec import machine_lanes
 from tests.laws.graphs import passes, spacecraft
 from tests.laws.problems import MU_EARTH, assert_same_estimate, b612, satellite
 from tests.references import dense_cost, textbook
@@ -155,45 +154,6 @@ def rates(x):
     """Gravity of the toy planet, for many states at once."""
     r3 = np.hypot(x[:, 0], x[:, 1]) ** 3
     return np.stack([x[:, 2], x[:, 3], -1000.0 * x[:, 0] / r3, -1000.0 * x[:, 1] / r3], axis=1)
-
-
-def lanes_set(monkeypatch, lanes):
-    monkeypatch.setenv("PIAZZI_LANES", lanes)
-    machine_lanes.cache_clear()
-
-
-@pytest.fixture
-def any_lanes(monkeypatch):
-    """Lanes as the environment says now, and afterwards as it says then."""
-    yield monkeypatch
-    monkeypatch.undo()
-    machine_lanes.cache_clear()
-
-
-def regular():
-    problem = satellite(pz.Taylor(max_step=1.0))
-    return problem, pz.simulate(problem, np.arange(61) * 15.0, np.random.default_rng(5))
-
-
-def irregular():
-    problem = satellite(pz.Taylor(max_step=1.0))
-    gaps = np.random.default_rng(0).choice([15.0, 15.0, 15.0, 8.0], 61)
-    return problem, pz.simulate(problem, np.cumsum(gaps), np.random.default_rng(5))
-
-
-@pytest.mark.parametrize("problem", [regular, irregular, pytest.param(ranges, marks=pytest.mark.slow)])
-def test_lanes_change_nothing(problem, any_lanes):
-    """One state at a time or several to a register: for a number of states that none divides, and for mixed substeps."""
-    problem, tracking = problem()
-    found = []
-    for lanes in ("1", ""):
-        lanes_set(any_lanes, lanes)
-        found.append(
-            (pz.FactorGraph(tolerance=1e-9).estimate(problem, tracking), pz.SlidingWindow(20).estimate(problem, tracking))
-        )
-    for one, several in zip(*found, strict=True):
-        assert_same_estimate(several, one, 1e-8)
-        assert_relative(several, one, 1e-12)
 
 
 def assert_relative(a, b, tolerance):

@@ -1,0 +1,202 @@
+"""What vector lanes change: a result made with them beside the one without, in units in which rounding means something.
+
+Units: of a mean, the largest value of that state over the run, or its standard deviation where that is larger; of a covariance,
+the two standard deviations at its epoch; of an innovation, the largest measured value of its component, or its own standard
+deviation.  So a number that is small because large ones cancelled is judged by the large ones.
+
+Bound: 1e-12.  What moves by more than that without lanes too, where every number that it is made of moves by one unit in the
+last place, may differ by `MULTIPLE` times as much, but never by more than `CEILING`: the order of operations cannot matter less
+than the last bit of what they begin with.  Two things are of that kind.  Covariances whose correlations are nearly singular: a
+condition number of 5e4, as bearings leave, times 2e-16 is 1e-11.  And iterations that gain one digit each, as those of the
+plain graph on outliers, and stop at 1e-6 sigma, one earlier or one later.
+"""
+
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import llvmlite.binding as llvm
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi import kernels
+from piazzi.kernels.spec import lanes_with, machine_lanes
+
+LIMIT, MULTIPLE, CEILING = 1e-12, 5.0, 1e-7
+DRAWS = 8  # at most, of numbers moved by one unit in the last place
+
+
+@contextmanager
+def lanes(count):
+    """So many lanes inside, as PIAZZI_LANES would say."""
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("PIAZZI_LANES", str(count))
+            machine_lanes.cache_clear()
+            yield
+    finally:
+        machine_lanes.cache_clear()
+
+
+@cache
+def wide():
+    """This machine's lanes, whatever the environment says; two where it has no vector unit, for they are right anywhere."""
+    return max(lanes_with(llvm.get_host_cpu_features()), 2)
+
+
+@contextmanager
+def kernels_used():
+    """Specifications of the kernels that are loaded inside."""
+    specs, load = [], kernels.load
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernels, "load", lambda spec: specs.append(spec) or load(spec))
+        yield specs
+
+
+def work_in_lanes(specs):
+    """Whether one of these kernels does."""
+    return any(spec.lanes > 1 and any(speaks_of_lanes(name) for name in spec.fragments) for spec in specs)
+
+
+@cache
+def speaks_of_lanes(fragment):
+    return "LANES" in (Path(kernels.__file__).parent / "fragments" / f"{fragment}.py").read_text()
+
+
+# ---- differences -----------------------------------------------------------------------------------------------------
+
+
+def worst(a, b, unit):
+    """The largest |a - b| / unit; what is missing in both is the same, and infinitely far where it is in one."""
+    with np.errstate(all="ignore"):
+        apart = np.where((a == b) | (np.isnan(a) & np.isnan(b)), 0.0, np.abs(a - b) / unit)
+    return float(np.where(np.isnan(apart), np.inf, apart).max(initial=0.0))
+
+
+def sigmas(covariances):
+    """Standard deviations (..., n) of covariances (..., n, n), NaN where there are none."""
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(np.diagonal(covariances, axis1=-2, axis2=-1))
+
+
+def products(s):
+    """Products of standard deviations, (..., n, n)."""
+    return s[..., :, None] * s[..., None, :]
+
+
+def differences(a, b):
+    """How far each result of estimate `a` is from that of `b`."""
+    assert a.success == b.success, f"with {a.message!r}, without {b.message!r}"
+    found = one_view(a, b)
+    if b.delayed is not None:
+        found |= {f"delayed {what}": apart for what, apart in one_view(a.delayed, b.delayed).items()}
+    return found
+
+
+def one_view(a, b):
+    s, spread = sigmas(b.covariance), sigmas(b.innovation_covariances)
+    z = np.abs(b.tracking.padded(spread.shape[-1]))
+    seen = z.max(axis=0, where=~np.isnan(z), initial=0.0)
+    found = {
+        "mean": worst(a.mean, b.mean, np.fmax(np.abs(b.mean).max(axis=0), s)),
+        "covariance": worst(a.covariance, b.covariance, products(s)),
+        "innovations": worst(a.innovations, b.innovations, np.fmax(seen, spread)),
+        "innovation covariances": worst(a.innovation_covariances, b.innovation_covariances, products(spread)),
+    }
+    return found | details(a.details, b.details, s)
+
+
+def details(a, b, s):
+    units = {"cost": abs(b.get("cost", 1.0)), "weights": 1.0, "cross_covariances": s[:-1, :, None] * s[1:, None, :]}
+    found = {what: worst(a[what], b[what], unit) for what, unit in units.items() if what in b}
+    if "modes" in b:
+        likely, other = ([mode["probability"] for mode in d["modes"]] for d in (b, a))
+        assert len(likely) == len(other), f"{len(other)} modes with lanes, {len(likely)} without"
+        found["probabilities"] = worst(np.array(other), np.array(likely), 1.0)
+        found["mode states"] = worst(a["mode_states"], b["mode_states"], np.abs(b["mode_states"]).max(axis=(0, 1)))
+    return found
+
+
+# ---- what one unit in the last place does ----------------------------------------------------------------------------
+
+
+def nudged(a, rng):
+    """Numbers of which each is moved by one unit in the last place, up or down, or not; zeros and missing ones are not."""
+    a = np.asarray(a, dtype=float)
+    unit = np.spacing(a, where=np.isfinite(a) & (a != 0), out=np.zeros(a.shape))
+    return a + rng.integers(-1, 2, a.shape) * unit
+
+
+def nudged_covariance(P, rng):
+    """A covariance with standard deviations moved by a unit in the last place: what was singular remains so."""
+    d = rng.choice([1.0 - 2.0**-53, 1.0, 1.0 + 2.0**-52], len(P))
+    return P * np.outer(d, d)
+
+
+def nudged_value(value, rng):
+    if isinstance(value, pz.Gaussian):
+        return pz.Gaussian(nudged(value.mean, rng), nudged_covariance(value.covariance, rng))
+    return float(nudged(value, rng))
+
+
+def nudged_problem(problem, rng):
+    """The problem with prior, noises, parameters and numbers of stations nudged."""
+
+    def values(given):
+        return {name: nudged_value(value, rng) for name, value in given.items()}
+
+    noise = problem.process_noise
+    stations = [replace(s, noise=nudged_covariance(s.noise, rng), numbers=values(s.numbers)) for s in problem.stations]
+    return replace(
+        problem,
+        prior=nudged_value(problem.prior, rng),
+        process_noise=replace(noise, covariance=nudged_covariance(noise.covariance, rng)),
+        parameters=values(problem.parameters),
+        stations=stations,
+    )
+
+
+def assert_rounding(found, moved):
+    """Differences `found` are within the bound; `moved(rng)` gives those that nudging makes, drawn as often as it takes.
+
+    Returns the largest of the latter where there had to be any.
+    """
+    own = {what: 0.0 for what, apart in found.items() if apart > LIMIT}
+    for seed in range(DRAWS):
+        if all(found[what] <= MULTIPLE * own[what] for what in own):
+            break
+        draw = moved(np.random.default_rng(seed))
+        own = {what: max(largest, draw.get(what, 0.0)) for what, largest in own.items()}
+    for what, largest in own.items():
+        assert found[what] <= min(MULTIPLE * largest, CEILING), (
+            f"lanes change {what} by {found[what]:.2g} of its unit, one unit in the last place of the inputs by {largest:.2g}"
+        )
+    return own
+
+
+@dataclass(frozen=True)
+class Compared:
+    """An estimate without lanes, how far the one with lanes is, what nudging does where that is far, and if lanes worked."""
+
+    one: pz.Estimate
+    found: dict
+    own: dict
+    in_lanes: bool
+
+
+def compared(run, problem, tracking):
+    """The estimate without lanes after a check that lanes change nothing but rounding; `run` is an estimator's `estimate`."""
+    with lanes(1):
+        one = run(problem, tracking)
+    with lanes(wide()), kernels_used() as specs:
+        several = run(problem, tracking)
+
+    def moved(rng):
+        with lanes(1):
+            other = run(nudged_problem(problem, rng), replace(tracking, values=nudged(tracking.values, rng)))
+        return differences(other, one) if other.success == one.success else {}
+
+    found = differences(several, one)
+    return Compared(one, found, assert_rounding(found, moved), work_in_lanes(specs))
