@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi.estimate.registry import parse
 from piazzi.evaluate import Comparison, compare, observability, windows
 from piazzi.evaluate.quantities import number
 from piazzi.present.colours import shade_of
@@ -129,6 +130,29 @@ def test_dragging_shows_a_stretch_of_time_in_every_panel(open_page, report):
     assert float(page.evaluate(last)) < 7
     again.click()
     assert float(page.evaluate(last)) > 7
+
+
+def test_a_stretch_of_time_has_a_scale_of_its_own(open_page, report):
+    """It holds all values of the stretch that the whole run's scale held, and no chart is seen less closely than before."""
+    page = open_page(report)
+    seen = """() => TABS[0].drawings.filter((d) => d.spec.time && d.sy).map((d) => ({
+        limits: [d.sy.low, d.sy.high],
+        values: d.lines.flatMap((l) => [...l.y].filter((v, i) => l.seconds[i] >= 5 && l.seconds[i] <= 6 && !Number.isNaN(v))),
+        ticks: d.svg.querySelectorAll(".grid-lines text[text-anchor=end]").length, scale: d.spec.y.scale }))"""
+    before = page.evaluate(seen)
+    page.evaluate("() => TABS[0].zoomTo([5, 6])")
+    after = page.evaluate(seen)
+    narrower = 0
+    for whole, part in zip(before, after, strict=True):
+        (low, high), (bottom, top) = part["limits"], whole["limits"]
+        assert bottom <= low < high <= top
+        held = [v for v in part["values"] if bottom <= v <= top and (v > 0 or part["scale"] != "log")]
+        assert all(low <= v <= high for v in held)
+        assert part["ticks"] >= 2
+        narrower += (low, high) != (bottom, top)
+    assert narrower >= 4
+    page.evaluate("() => TABS[0].zoomTo(null)")
+    assert page.evaluate(seen) == before
 
 
 def brightness(colour: str) -> float:
@@ -274,3 +298,12 @@ def test_every_estimator_has_its_own_look_and_the_colour_of_the_pictures(open_pa
     looks = [(mark.get_attribute("stroke"), mark.get_attribute("stroke-dasharray")) for mark in marks]
     assert len(set(looks)) == len(looks) == 4
     assert [colour for colour, _ in looks] == [shade_of(name) for name in ("ekf", "graph", "window:20", "window:20")]
+
+
+def test_windows_of_near_lengths_have_looks_of_their_own(open_page, comparison, tmp_path):
+    """Shades of 50 and 100 states are near each other, and 100 with three iterations has the shade of 100: dashes differ."""
+    names = ("window:50", "window:100", "window:100x3", "window:200")
+    found = compare(comparison.problem, comparison.tracking, {name: parse(name) for name in names})
+    marks = open_page(write_page(tmp_path / "w.html", "W", [comparison_tab(found)])).locator("#t0 .chip svg line").all()
+    dashes = [mark.get_attribute("stroke-dasharray") for mark in marks]
+    assert len(set(dashes)) == len(dashes) == 8

@@ -23,6 +23,7 @@ MEASURED = "#555555"
 PLANET = "#C9D3DC"
 STATIONS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES = ((), (5, 2), (1, 2), (6, 2, 1, 2))
+LONG, DOT, MOST_DOTS = (12, 2), (1, 2), 4
 _LAG = 100  # of the window that has the colour of windows as it is
 _OPTION = 0.3  # how far an estimator with options is from the plain one, towards white
 
@@ -58,9 +59,15 @@ def shades(names: Iterable[str]) -> dict[str, str]:
 
 
 def dash_of(name: str, view: str, names: Iterable[str] = ()) -> tuple[int, ...]:
-    """Lengths of dashes and gaps, () for a whole line: dashed for what a window says late, and where names share a shade."""
-    if name.partition(":")[0] == "window" and view == "delayed":
-        return DASHES[1]
+    """Lengths of dashes and gaps, () for a whole line: what a window says late has short dashes.
+
+    Names that share a shade get dashes of their own.  So do windows, whose shades are near each other: the second among `names`
+    has a dot between its dashes, the third has two.
+    """
+    if name.partition(":")[0] == "window":
+        windows = [other for other in dict.fromkeys(names) if other.partition(":")[0] == "window"]
+        dots = DOT * (windows.index(name) % MOST_DOTS if name in windows else 0)
+        return (*DASHES[1], *dots) if view == "delayed" else (*LONG, *dots) if dots else DASHES[0]
     found = shades(names)
     same = [other for other in found if found[other] == found.get(name)]
     place = same.index(name) if name in same else 0

@@ -28,10 +28,28 @@ class Chart {
     const x = this.spec.time ? this.tab.span : extent(this.lines.map((l) => l.x), this.xAxis);
     const y = extent(this.lines.map((l) => l.y), this.yAxis);
     const fx = this.spec.x.show[1];
+    const whole = [this.yAxis.low ?? y[0], this.yAxis.high ?? y[1]];
     return {
       x: zoom ? zoom.map((t) => t * fx) : this.spec.time ? x.map((t) => t * fx) : [this.xAxis.low ?? x[0], this.xAxis.high ?? x[1]],
-      y: [this.yAxis.low ?? y[0], this.yAxis.high ?? y[1]],
+      y: zoom ? this.closer(zoom, whole) : whole,
     };
+  }
+
+  // Limits of y for a stretch of time: its values and what they are compared with, no farther than those of the whole run.
+  closer([from, to], whole) {
+    const f = this.spec.y.show[1];
+    const within = ({ y, seconds }) => y.filter((_, i) => seconds[i] >= from && seconds[i] <= to);
+    const values = this.lines.map(within);
+    if (!values.some((v) => v.some(Number.isFinite))) return whole;
+    const below = this.lines.filter((line) => line.kind === "band").map((line) => within(line).map((v) => -v));
+    const beside = [...this.spec.ranges.flatMap(([low, high]) => [low, high]), ...this.spec.levels.map(([level]) => level)];
+    let [low, high] = extent([...values, ...below, beside.map((v) => v * f)], this.yAxis);
+    if (this.yAxis.scale === "symmetric") {
+      high = Math.max(Math.abs(low), Math.abs(high), 10 * this.yAxis.threshold);
+      low = -high;
+    }
+    const cut = [Math.max(low, whole[0]), Math.min(high, whole[1])];
+    return cut[0] < cut[1] ? cut : whole;
   }
 
   draw(width) {
