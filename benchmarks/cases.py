@@ -68,7 +68,7 @@ def solved(case: Case | None = None) -> tuple[Any, Any]:
     """A chain of states linearised and solved at the solution of the full graph (default: the recording's), and its solver."""
     from piazzi.estimate.chain import Chain, CovarianceSolver
     from piazzi.estimate.factor_graph import FactorGraph
-    from piazzi.estimate.inputs import prepare
+    from piazzi.problem.inputs import prepare
 
     problem, tracking = case or pz.load(recording())
     chain = Chain(problem, prepare(problem, tracking))

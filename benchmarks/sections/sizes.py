@@ -15,7 +15,7 @@ EPOCHS = 200
 
 def figures() -> Iterator[Figure]:
     from piazzi.estimate import chain
-    from piazzi.estimate.inputs import prepare
+    from piazzi.problem.inputs import prepare
     from piazzi.kernels.spec import lanes_for, machine_lanes
 
     many = max(machine_lanes(), 2)

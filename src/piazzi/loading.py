@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 
 import numpy as np
 
 from piazzi.problem import Problem, Tracking
+from piazzi.problem.inputs import prepare
 from piazzi.scenarios import load_scenario, names
 from piazzi.simulation import simulate
 
@@ -35,7 +37,13 @@ def load(
     ValueError
         For an unknown scenario or a file with something wrong in it: what, the value, and where.
     """
-    text = os.fspath(source)
+    problem, tracking = _loaded(os.fspath(source), seed, scenario)
+    with contextlib.suppress(ValueError):  # estimators say what does not fit
+        prepare(problem, tracking)
+    return problem, tracking
+
+
+def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None) -> tuple[Problem, Tracking]:
     kind = Path(text).suffix.lower()
     if scenario is not None and kind != ".csv":
         raise ValueError(f"{text}: only a .csv file is loaded with a scenario; this one holds its own problem")

@@ -9,9 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.estimate.inputs import prepare
 from piazzi.evaluate.information import along, bound, coast, factor, from_first, growth, predicted, singular
 from piazzi.evaluate.twins import find_twins
+from piazzi.problem.inputs import prepare
 from tests.laws.problems import linear, network, random_covariance, random_stable, satellite
 
 KEYS = {"schema", "states", "epochs", "singular_values", "condition", "crlb_sigma", "weakest_direction", "twins", "verdict"}

@@ -225,6 +225,8 @@ PACKS: dict[str, tuple[str, Callable[..., np.ndarray]]] = {
     "one problem's matrix product": ("C @ A", lambda A, B, u, v, s, q, C, c, k: C @ A),
     "congruence": ("A @ B @ A.T", lambda A, B, u, v, s, q, C, c, k: A @ B @ A.T),
     "transpose": ("A.T", lambda A, B, u, v, s, q, C, c, k: A.T),
+    "sum with an outer product": ("plus_outer(A, u, v)", lambda A, B, u, v, s, q, C, c, k: A + np.outer(u, v)),
+    "outer product added to one problem's": ("plus_outer(C, -u, v)", lambda A, B, u, v, s, q, C, c, k: C - np.outer(u, v)),
     "outer product": ("outer(u, v)", lambda A, B, u, v, s, q, C, c, k: np.outer(u, v)),
     "vector of packs and numbers": ("vector(s, 1.0, q)", lambda A, B, u, v, s, q, C, c, k: np.array([s, 1.0, q])),
     "matrix of both kinds of rows": ("matrix(u, c)", lambda A, B, u, v, s, q, C, c, k: np.array([u, c])),
@@ -242,6 +244,10 @@ PACKS: dict[str, tuple[str, Callable[..., np.ndarray]]] = {
     "circular": ("sin(s) + cos(q) + tan(s)", lambda A, B, u, v, s, q, C, c, k: np.sin(s) + np.cos(q) + np.tan(s)),
     "hyperbolic": ("sinh(s) + cosh(q) + tanh(s)", lambda A, B, u, v, s, q, C, c, k: np.sinh(s) + np.cosh(q) + np.tanh(s)),
     "arcs": ("atan(s) + asin(s / 9)", lambda A, B, u, v, s, q, C, c, k: np.arctan(s) + np.arcsin(s / 9)),
+    "chosen": ("choose(s, 0.1 * k, q, 2.0)", lambda A, B, u, v, s, q, C, c, k: np.where(s > 0.1 * k, q, 2.0)),
+    "fused vectors": ("fused(s, u, v)", lambda A, B, u, v, s, q, C, c, k: s * u + v),
+    "fused with one problem's": ("fused(k, c, fused(s, c, u))", lambda A, B, u, v, s, q, C, c, k: k * c + s * c + u),
+    "fused matrices": ("fused(q, A, fused(k, C, B))", lambda A, B, u, v, s, q, C, c, k: q * A + k * C + B),
     "arc cosine": ("acos(q / 9)", lambda A, B, u, v, s, q, C, c, k: np.arccos(q / 9)),
 }  # fmt: skip
 
@@ -289,6 +295,64 @@ def test_lanes_are_independent_problems(n, w):
             expected = meaning(**of_lane(given, lane))
             assert_allclose(results[name][lane], expected, rtol=1e-13, atol=1e-13, err_msg=f"{name}, lane {lane}")
     assert_array_equal(results.guards(), GUARD)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7, 8])
+def test_lanes_give_the_same_bits(n):
+    """Sums of products round alike in a register along the row and in a register across problems."""
+    from piazzi.kernels import compiled
+
+    w = 4
+    given, size, each = given_packs(n, w), n * n, 2 * n * n + n + 1
+    rest, last = 2 * size, 2 * size + n
+    alone, together = np.zeros((w, each)), np.zeros((w, each))
+
+    def one_by_one(A_, B_, u_, s_, out):
+        for lane in range(w):
+            A, B, u = (
+                compiled.load_matrix(A_, lane * size, n, n),
+                compiled.load_matrix(B_, lane * size, n, n),
+                compiled.load_vector(u_, lane * n, n),
+            )
+            compiled.store(out, lane * each, A @ B @ A.T)
+            compiled.store(out, lane * each + size, compiled.fused(s_[lane], A, compiled.plus_outer(B, -u, u @ B)))
+            compiled.store(out, lane * each + rest, A @ u)
+            out[lane * each + last] = u @ (u @ B)
+
+    def at_once(A_, B_, u_, s_, out):
+        A, B, u = (
+            compiled.load_matrices(A_, 0, n, n, size, w),
+            compiled.load_matrices(B_, 0, n, n, size, w),
+            compiled.load_lanes(u_, 0, n, n, w),
+        )
+        compiled.store_lanes(out, 0, each, A @ B @ A.T)
+        compiled.store_lanes(
+            out, size, each, compiled.fused(compiled.load_lanes(s_, 0, 1, 1, w)[0], A, compiled.plus_outer(B, -u, u @ B))
+        )
+        compiled.store_lanes(out, rest, each, A @ u)
+        compiled.store_lanes(out, last, each, compiled.vector(u @ (u @ B)))
+
+    for function, out in ((one_by_one, alone), (at_once, together)):
+        call(function, given["A"], given["B"], given["u"], given["s"], out)
+    assert np.abs(alone[:, -1]).min() > 0
+    assert_array_equal(together, alone)
+
+
+@pytest.mark.parametrize("w", [1, *LANES])
+def test_a_stride_of_zero_gives_all_lanes_one_matrix(w):
+    """That is how what is left over from the lanes is worked on; work space keeps what is written to it."""
+    from piazzi.kernels.compiled import load_matrices, load_packs, scratch, store_lanes, store_packs
+
+    size = 3 * w
+
+    def through(a, out):
+        room = scratch(size)
+        store_packs(room, 0, load_matrices(a, 1, 2, 3, 0, w)[1], w)
+        store_lanes(out, 1, 0, load_packs(room, 0, 3, w))
+
+    a, out = np.arange(8.0), np.full(5, GUARD)
+    call(through, a, out)
+    assert_array_equal(out, [GUARD, 4.0, 5.0, 6.0, GUARD])
 
 
 @pytest.mark.parametrize("w", LANES)

@@ -51,7 +51,7 @@ def twice(kind, record):
         record["in lanes"] += result.in_lanes
         for what, apart in result.found.items():
             place = f"{kind.__name__}, {what}"
-            record["worst"][place] = max(record["worst"].get(place, (0.0, 0.0)), (apart, result.own.get(what, 0.0)))
+            record["worst"][place] = max(record["worst"].get(place, 0.0), apart)
         return result.one
 
     estimate.__wrapped__ = alone.__wrapped__  # what `nominal` calls is the estimator's own
@@ -67,11 +67,10 @@ def pytest_terminal_summary(terminalreporter):
     made, in_lanes = (sum(record[what] for _, record in records) for what in ("estimates", "in lanes"))
     worst = {}
     for law, record in records:
-        for place, numbers in record["worst"].items():
-            worst[place] = max(worst.get(place, (0.0, 0.0, "")), (*numbers, law.removeprefix("tests/laws/")))
+        for place, apart in record["worst"].items():
+            worst[place] = max(worst.get(place, (0.0, "")), (apart, law.removeprefix("tests/laws/")))
     terminalreporter.section("lanes")
-    terminalreporter.write_line(f"{made} estimates, {in_lanes} of them in lanes; the largest differences, each in its unit,")
-    terminalreporter.write_line("and beside those over 1e-12 what one unit in the last place of the inputs does without lanes:")
-    for place, (apart, own, law) in sorted(worst.items(), key=lambda item: -item[1][0])[:MOST_LINES]:
-        beside = f"({own:.1e})" if own else ""
-        terminalreporter.write_line(f"{apart:7.1e} {beside:9} {place}: {law}")
+    terminalreporter.write_line(f"{made} estimates, {in_lanes} of them in lanes; where they differ at all, each in its unit:")
+    for place, (apart, law) in sorted(worst.items(), key=lambda item: -item[1][0])[:MOST_LINES]:
+        if apart:
+            terminalreporter.write_line(f"{apart:7.1e} {place}: {law}")

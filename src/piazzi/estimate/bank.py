@@ -11,11 +11,11 @@ import numpy as np
 
 from piazzi.estimate.chain import Chain, Solver
 from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome
-from piazzi.estimate.inputs import Inputs
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.robust import RobustChain, descend, gated_run, stand
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs
 
 SAME = 0.1  # solutions closer than this many standard deviations, everywhere, are one
 NEGLIGIBLE = 1e-9  # modes less probable than this are not reported

@@ -16,10 +16,10 @@ from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.factor_graph import FactorGraph
 from piazzi.estimate.gauss_newton import Outcome, optimize
-from piazzi.estimate.inputs import prepare, with_prior_node
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
+from piazzi.problem.inputs import prepare, with_prior_node
 
 PATIENCE = 15  # iterations from the prior before the graph is asked; where it converges at all, half of them suffice
 

@@ -14,10 +14,9 @@ from piazzi.problem.checks import Array
 
 
 @lru_cache(maxsize=64)
-def border_spec(n: int, width: int, noise_varies: bool) -> KernelSpec:
-    """The kernels of the border around a chain of `n` states; the number of constants is an argument of theirs."""
-    chain = solve_spec(n, width, noise_varies)
-    return KernelSpec(chain.model, chain.scheme, (*chain.fragments[:-1], "border", "graph_border"))
+def border_spec(chain: KernelSpec) -> KernelSpec:
+    """The kernels of the border around a chain with these; the number of constants is an argument of theirs."""
+    return KernelSpec(chain.model, chain.scheme, (*chain.fragments[:-1], "border", "graph_border"), chain.lanes)
 
 
 def root_of(covariance: Array) -> Array:
@@ -48,8 +47,8 @@ class BorderedSolver:
         K, J, M, n, nd = i.epochs, len(i.z), model.width, model.n, len(model.moving)
         C = n - nd
         self.nd, self.C, self.size = nd, C, n
-        self.border = kernels.load(border_spec(nd, M, problem.noise_varies))
-        self.inner = kernels.load(solve_spec(nd, M, problem.noise_varies))
+        inner = solve_spec(nd, M, problem.noise_varies)
+        self.border, self.inner = kernels.load(border_spec(inner)), kernels.load(inner)
         self.root = root_of(problem.covariance[:nd, :nd])
         self.sigma = np.sqrt(np.diag(problem.covariance)[nd:]) if C else np.zeros(1)
         self.Q = np.ascontiguousarray(problem.process_noise.covariance[:nd, :nd])
@@ -60,7 +59,7 @@ class BorderedSolver:
         self.inverse, self.b = np.empty((n, n)), np.zeros(n)
         self.space = (np.empty((n, n)), np.empty(n), np.empty((n, nd)), np.empty(n), self.inverse, np.empty((n, n)))
         self.own = np.empty((nd, nd))
-        rows = int(np.diff(i.first_row).max()) * M + nd
+        rows = i.most_rows * M + nd
         self.d, self.P = np.empty((K, nd)), np.empty((K, nd, nd))
         self.P_last, self.gains = np.empty((nd, nd)), np.empty((rows, nd + 1))
         self.multiplier, self.dx = np.empty((K, nd)), np.empty((K, nd))
@@ -119,8 +118,8 @@ class BorderedSolver:
         f, nu = c.f[:, :nd] + constants @ self.B, c.nu - self.G @ constants
         self.inner.graph_solve(
             i.epochs, i.scale, i.first_row, self.Q, first, np.zeros((nd, nd)), np.ascontiguousarray(c.x[:, :nd]), f, self.A,
-            self.Q_all, nu, self.H, self.tether, float(damping), self.d, self.P, self.P_last, self.gains, self.multiplier,
-            self.dx, c.report,
+            self.Q_all, nu, self.H, self.tether, self.d, self.P, self.P_last, self.gains, self.multiplier, self.dx,
+            c.report, float(damping),
         )  # fmt: skip
 
     def marginals(self) -> Array:
@@ -154,8 +153,8 @@ class BorderedSolver:
         c, i, nd = self.chain, self.chain.inputs, self.nd
         P, cross = np.empty((i.epochs, nd, nd)), np.zeros((max(i.epochs - 1, 1), nd, nd))
         self.inner.graph_marginals(
-            i.epochs, i.scale, i.first_row, self.Q, self.A, self.Q_all, c.nu, self.H, self.P, self.P_last, np.empty((nd, nd)),
-            np.empty((nd, nd)), int(keep_cross), self.dx, P, cross, c.report,
+            i.epochs, i.scale, i.first_row, self.Q, self.A, self.Q_all, c.nu, self.H, self.P, self.P_last,
+            int(keep_cross), self.dx, P, cross, c.report,
         )  # fmt: skip
         W = self.factors()
         covariance = W @ W.transpose(0, 2, 1)

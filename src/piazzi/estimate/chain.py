@@ -9,12 +9,12 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.inputs import Inputs
 from piazzi.kernels import Discrete, KernelSpec
 from piazzi.kernels.spec import lanes_for
 from piazzi.model import Model, Sensor
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs
 
 # slots of the kernels' report
 MEASUREMENT, DYNAMICS, PRIOR, DEFECT, GRADIENT, FIT, STEP, STEP_SMOOTHED, WIDEST = range(9)
@@ -42,13 +42,17 @@ def chain_fragments(problem: Problem, *last: str) -> tuple[str, ...]:
 ROUNDING = 4 * float(np.finfo(float).eps)
 
 
-@lru_cache(maxsize=64)
 def solve_spec(n: int, width: int, noise_varies: bool) -> KernelSpec:
     """The kernels that solve a linearised chain: they depend on its sizes only, so all models of one size share them."""
+    return _solve_spec(n, width, noise_varies, lanes_for(n))
+
+
+@lru_cache(maxsize=64)
+def _solve_spec(n: int, width: int, noise_varies: bool, lanes: int) -> KernelSpec:
     names = tuple(f"s{i}" for i in range(n))
     sizes = Model(names, ("0",) * n, (Sensor("any", ["0"] * width),), discrete=True)
     noise = f"chain_noise_{'integral' if noise_varies else 'scaled'}"
-    return KernelSpec(sizes, Discrete().scheme, ("matrices", noise, "chain", "marginals", "graph"))
+    return KernelSpec(sizes, Discrete().scheme, ("matrices", noise, "chain", "marginals", "graph"), lanes)
 
 
 def tether_of(problem: Problem) -> Array:
@@ -79,7 +83,7 @@ class Chain:
         self._linearize = self._bind_linearize()
 
     def _bind_linearize(self) -> Callable[[], None]:
-        i, p, N, M = self.inputs, self.problem, self.problem.model.n, self.problem.model.width
+        i, p = self.inputs, self.problem
         bound: Callable[[], None] = self.library.graph_linearize.bind(
             i.epochs,
             i.t,
@@ -96,11 +100,7 @@ class Chain:
             self.Q_all,
             self.nu,
             self.H,
-            np.empty(M * (M + N)),
             self.tether,
-            np.empty((N, N)),
-            np.empty(N),
-            np.empty(N),
             self.broken,
             self.report,
         )
@@ -142,15 +142,16 @@ class Chain:
 
     def innovations(self) -> tuple[Array, Array]:
         """Innovations and their covariances along the final linearisation, (J, m) and (J, m, m)."""
-        return self._differences(self.d_pred, self.P_pred)
+        return self._differences(self.d_pred, self.P_pred, 1)
 
     def residuals(self) -> Array:
         """Measurements minus what the states say they should be, (J, m), NaN where missing."""
-        return self._differences(np.zeros_like(self.d_pred), np.zeros_like(self.P_pred))[0]
+        N = self.problem.model.n
+        return self._differences(np.zeros((1, N)), np.zeros((1, N, N)), 0)[0]
 
-    def _differences(self, d: Array, P: Array) -> tuple[Array, Array]:
-        """z - h(x) - H d and H P H^T + R of all rows."""
-        i, M, N = self.inputs, self.problem.model.width, self.problem.model.n
+    def _differences(self, d: Array, P: Array, step: int) -> tuple[Array, Array]:
+        """z - h(x) - H d and H P H^T + R of all rows; from epoch to epoch, d and P go on by so many entries."""
+        i, M = self.inputs, self.problem.model.width
         nu, S = np.empty((len(i.z), M)), np.empty((len(i.z), M, M))
         self.library.graph_innovations(
             i.epochs,
@@ -160,8 +161,7 @@ class Chain:
             self.x,
             d,
             P,
-            np.empty(M),
-            np.empty((M, N)),
+            step,
             nu,
             S,
         )
@@ -201,24 +201,9 @@ class CovarianceSolver:
         self.chain = chain
         model = chain.problem.model
         self.kernels = kernels.load(solve_spec(model.n, model.width, chain.problem.noise_varies))
-        rows = int(np.diff(chain.inputs.first_row).max()) * chain.problem.model.width + chain.problem.model.n
-        N = chain.problem.model.n
-        self.gains, self.P_last = np.empty((rows, N + 1)), np.empty((N, N))
-
-    def begin(self, states: Array) -> Array:
-        return states
-
-    def moved(self, states: Array, step: Array) -> Array:
-        return states + step
-
-    def widest(self) -> float:
-        c, i = self.chain, self.chain.inputs
-        self.kernels.graph_probe(i.epochs, i.first_row, c.nu, c.H, c.P_pred, c.report)
-        return float(c.report[WIDEST])
-
-    def solve(self, damping: float) -> None:
-        c, i, p = self.chain, self.chain.inputs, self.chain.problem
-        self.kernels.graph_solve(
+        c, i, p, N = chain, chain.inputs, chain.problem, model.n
+        self.gains, self.P_last = np.empty((i.most_rows * model.width + N, N + 1)), np.empty((N, N))
+        self._linearized = kernels.ready(
             i.epochs,
             i.scale,
             i.first_row,
@@ -232,7 +217,6 @@ class CovarianceSolver:
             c.nu,
             c.H,
             c.tether,
-            float(damping),
             c.d_pred,
             c.P_pred,
             self.P_last,
@@ -241,6 +225,20 @@ class CovarianceSolver:
             c.dx,
             c.report,
         )
+
+    def begin(self, states: Array) -> Array:
+        return states
+
+    def moved(self, states: Array, step: Array) -> Array:
+        return states + step
+
+    def widest(self) -> float:
+        c, i = self.chain, self.chain.inputs
+        self.kernels.graph_probe(i.epochs, i.first_row, c.nu, c.H, c.P_pred, c.report)
+        return float(c.report[WIDEST])
+
+    def solve(self, damping: float) -> None:
+        self.kernels.graph_solve.after(self._linearized, float(damping))
 
     def marginals(self) -> Array:
         return self._marginals(np.empty((1, 1)), keep_cross=False)
@@ -265,8 +263,6 @@ class CovarianceSolver:
             c.H,
             c.P_pred,
             self.P_last,
-            np.empty((N, N)),
-            np.empty((N, N)),
             int(keep_cross),
             c.dx,
             covariance,

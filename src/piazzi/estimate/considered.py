@@ -35,8 +35,8 @@ def with_considered(run: Run[_Estimator]) -> Run[_Estimator]:
 
     @wraps(run)
     def estimate(self: _Estimator, problem: Problem, tracking: Tracking) -> Estimate:
-        names = considered_names(problem)
         nominal = run(self, problem, tracking)
+        names = problem.considered
         for name in names if names and nominal.success else ():  # only where there are any: the check takes time
             sides = [run(self, moved(problem, name, side * STEP), tracking) for side in (1.0, -1.0)]
             nominal = _inflated(nominal, name, *sides)

@@ -21,8 +21,9 @@ def undetermined(problem: Problem, first: Array, states: Array) -> str:
     states : (K, n), estimates, which tell how large each value (each group, as a vector) is
     """
     sigma = np.sqrt(np.diag(problem.covariance))
-    size = _sizes(problem, states)
-    wide = sigma > OPEN * size
+    if not (sigma > OPEN * np.maximum(np.abs(states[0]), 1.0)).any():  # a lower bound of the sizes, which are dearer
+        return ""
+    wide = sigma > OPEN * _sizes(problem, states)
     if not wide.any() or not np.isfinite(first).all():
         return ""
     unit = np.where(sigma > 0, sigma, 1.0)

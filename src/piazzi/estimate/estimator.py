@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -27,7 +27,7 @@ class Estimator(Protocol):
         """Estimate the state at every epoch of the tracking."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Estimate:
     """Result of an estimator.
 
@@ -56,13 +56,41 @@ class Estimate:
     innovation_covariances: Array
     iterations: int
     seconds: float
-    view: View = "realtime"
-    delayed: Estimate | None = None
-    details: Mapping[str, Any] = field(default_factory=dict)
-    failure: str = ""
+    view: View
+    delayed: Estimate | None
+    details: Mapping[str, Any]
+    failure: str
 
-    def __post_init__(self) -> None:
-        for a in (self.mean, self.covariance, self.innovations, self.innovation_covariances):
+    def __init__(
+        self,
+        problem: Problem,
+        tracking: Tracking,
+        mean: Array,
+        covariance: Array,
+        innovations: Array,
+        innovation_covariances: Array,
+        iterations: int,
+        seconds: float,
+        view: View = "realtime",
+        delayed: Estimate | None = None,
+        details: Mapping[str, Any] | None = None,
+        failure: str = "",
+    ) -> None:
+        self.__dict__.update(  # one after the other, as a frozen dataclass sets them, takes three times as long
+            problem=problem,
+            tracking=tracking,
+            mean=mean,
+            covariance=covariance,
+            innovations=innovations,
+            innovation_covariances=innovation_covariances,
+            iterations=iterations,
+            seconds=seconds,
+            view=view,
+            delayed=delayed,
+            details={} if details is None else details,
+            failure=failure,
+        )
+        for a in (mean, covariance, innovations, innovation_covariances):
             a.setflags(write=False)
 
     @property

@@ -15,7 +15,6 @@ from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome
-from piazzi.estimate.inputs import Inputs, prepare, with_prior_node
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.losses import Cauchy, loss_of
 from piazzi.estimate.robust import RobustChain, chain_for, descend, gated_run, stand
@@ -23,6 +22,7 @@ from piazzi.estimate.sliding_window import SlidingWindow
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
+from piazzi.problem.inputs import Inputs, prepare, with_prior_node
 
 STARTS = ("ekf", "prior", "window", "bank")
 SOLVERS = ("auto", "chain", "bordered")
@@ -221,11 +221,9 @@ def inconsistent(innovations: Array, covariances: Array) -> bool:
 def _together(tried: list[tuple[str, Outcome]]) -> Outcome:
     """The last outcome, with the iterations of all; where that failed too, with what was wrong with each."""
     last = tried[-1][1]
-    failure = (
-        "; ".join(f"from {start}: {outcome.failure}" for start, outcome in tried)
-        if last.failure and len(tried) > 1
-        else last.failure
-    )
+    if len(tried) == 1:
+        return last
+    failure = "; ".join(f"from {start}: {outcome.failure}" for start, outcome in tried) if last.failure else ""
     return replace(last, iterations=sum(outcome.iterations for _, outcome in tried), failure=failure)
 
 
@@ -237,4 +235,5 @@ def _too_wide(outcome: Outcome, solver: str) -> Outcome:
 
 def with_first(chain: Chain, states: Array) -> Array:
     """States at all nodes of the chain: before those of the epochs, the prior mean where the chain begins earlier."""
-    return np.vstack([chain.problem.mean] * (chain.inputs.epochs - len(states)) + [states])
+    before = chain.inputs.epochs - len(states)
+    return np.vstack([chain.problem.mean] * before + [states]) if before else states

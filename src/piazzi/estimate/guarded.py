@@ -10,11 +10,11 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.chi_square import quantile
-from piazzi.estimate.inputs import Inputs, scratch
 from piazzi.estimate.live import LiveFilter, checked_measurement
 from piazzi.estimate.saved import Saved
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs
 
 
 def check_gate(gate: float | None) -> None:
@@ -56,7 +56,6 @@ def guarded_run(problem: Problem, inputs: Inputs, fragments: tuple[str, ...], gu
         problem.process_noise.covariance,
         problem.mean,
         problem.covariance,
-        *scratch(problem),
         guard.iterations,
         guard.thresholds(m),
         rejected,
@@ -84,7 +83,7 @@ class GuardedLiveFilter(LiveFilter):
         m = problem.model.width
         parts = ("transition", problem.noise_fragment, *fragments, "epoch_guarded", "filter_live_guarded")
         self._library = kernels.load(problem.spec(*parts))
-        self._guard, self._thresholds, self._space = guard, guard.thresholds(m), scratch(problem)
+        self._guard, self._thresholds = guard, guard.thresholds(m)
         self._values, self._rows_of = np.empty((0, m)), np.empty(0, dtype=np.int64)
         self.rejected = False
 
@@ -117,7 +116,6 @@ class GuardedLiveFilter(LiveFilter):
             p.station_noise,
             p.station_correlated,
             p.given,
-            *self._space,
             self._guard.iterations,
             self._thresholds,
             rejected,

@@ -13,11 +13,11 @@ from piazzi import kernels
 from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.guarded import Guard, GuardedLiveFilter, check_gate, guarded_run
-from piazzi.estimate.inputs import Inputs, prepare, scratch
 from piazzi.estimate.live import LiveFilter
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
+from piazzi.problem.inputs import Inputs, prepare
 
 Update = Literal["auto", "joint", "components"]
 
@@ -25,7 +25,7 @@ Update = Literal["auto", "joint", "components"]
 def update_fragments(problem: Problem, update: Update) -> tuple[str, ...]:
     """The fragments that do the update: by components where every R is diagonal, unless told otherwise."""
     if update == "auto":
-        update = "joint" if 1 in problem.station_correlated.tolist() else "components"
+        update = "joint" if problem.is_correlated else "components"
     return ("decorrelate", "update_components", "epoch") if update == "components" else ("update_joint", "epoch")
 
 
@@ -82,18 +82,18 @@ class ExtendedKalmanFilter:
         ValueError
             Where the tracking does not fit the problem.
         """
-        inputs = prepare(problem, tracking)
-        if self.guard is None:
+        inputs, guard = prepare(problem, tracking), self.guard
+        if guard is None:
             mean, P, nu, S, seconds = filter_run(problem, inputs, self.update)
-            return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs, seconds)
+            return Estimate(problem, tracking, mean, P, nu, S, len(mean), seconds)
         watch = Stopwatch()
-        mean, P, nu, S, rejected = guarded_run(problem, inputs, update_fragments(problem, self.update), self.guard)
+        mean, P, nu, S, rejected = guarded_run(problem, inputs, update_fragments(problem, self.update), guard)
         seconds = watch.seconds()
         check_start(problem, inputs, mean[0])
         out = rejected.astype(bool)
         out.setflags(write=False)
         details = {} if self.gate is None else {"rejected": out, "rejected_count": int(out.sum())}
-        return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs * self.guard.iterations, seconds, details=details)
+        return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs * guard.iterations, seconds, details=details)
 
     def start(self, problem: Problem) -> LiveFilter:
         """A filter that takes one measurement at a time, beginning at the prior."""
@@ -104,29 +104,13 @@ class ExtendedKalmanFilter:
 def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tuple[Array, Array, Array, Array, float]:
     """Means (K, n), covariances (K, n, n), innovations (J, m), their covariances (J, m, m), and the seconds it took."""
     library = kernels.load(problem.spec("transition", problem.noise_fragment, *update_fragments(problem, update), "filter"))
-    K, n, (J, m) = inputs.epochs, problem.model.n, inputs.z.shape
-    mean, P = np.empty((K, n)), np.empty((K, n, n))
-    nu, S = np.empty((J, m)), np.empty((J, m, m))
+    K, n, (J, m) = len(inputs.t), len(problem.mean), inputs.z.shape
+    mean, P, nu, S = np.empty((K, n)), np.empty((K, n, n)), np.empty((J, m)), np.empty((J, m, m))
     started = time.perf_counter()
-    library.run_filter(
-        K,
-        inputs.t,
-        inputs.t_prior,
-        inputs.count,
-        inputs.scale,
-        *inputs.measured(problem),
-        problem.given,
-        problem.process_noise.covariance,
-        problem.mean,
-        problem.covariance,
-        *scratch(problem),
-        mean,
-        P,
-        nu,
-        S,
-    )
+    library.run_filter.after(inputs.run_of(problem), mean, P, nu, S)
     seconds = time.perf_counter() - started
-    check_start(problem, inputs, mean[0])
+    if not isfinite(mean.item(0)):  # a failed update leaves no number of the state
+        check_start(problem, inputs, mean[0])
     return mean, P, nu, S, seconds
 
 
@@ -206,7 +190,6 @@ def update(problem: Problem, belief: Any, station: str, z: Any, t: float = 0.0, 
         problem.station_noise,
         problem.station_correlated,
         problem.given,
-        *scratch(problem),
         x,
         P,
         nu,

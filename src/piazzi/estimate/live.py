@@ -9,7 +9,6 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.considered import considered_names
-from piazzi.estimate.inputs import scratch
 from piazzi.estimate.saved import Saved
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -137,7 +136,6 @@ class LiveFilter:
             problem.station_noise,
             problem.station_correlated,
             problem.given,
-            *scratch(problem),
             self._x_pred,
             self._P_pred,
             self._d,

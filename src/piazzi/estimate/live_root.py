@@ -7,12 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from piazzi.estimate.inputs import Inputs
 from piazzi.estimate.live import Clock, checked_measurement
 from piazzi.estimate.root import Root
 from piazzi.estimate.saved import Saved
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs
 
 
 class LiveRootFilter:

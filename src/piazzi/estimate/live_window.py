@@ -289,10 +289,7 @@ class LiveWindow:
                 np.empty((rows * m + n, n + 1)),
                 np.empty((big, n)),
                 self._dx,
-                np.empty(m),
-                np.empty((m, n)),
                 row_space(self.problem, self._loss, rows),
-                np.empty((n, n)),
                 np.empty((n, n)),
             )
             self._late_covariance = np.empty((big, n, n))

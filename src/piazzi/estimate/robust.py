@@ -10,11 +10,11 @@ import numpy as np
 from piazzi.estimate.chain import MEASUREMENT, PRIOR, Chain, Solver
 from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome, optimize
 from piazzi.estimate.guarded import Guard, guarded_run
-from piazzi.estimate.inputs import Inputs
 from piazzi.estimate.kalman import update_fragments
 from piazzi.estimate.losses import Huber, Loss
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs
 
 # how far, and how often, a loss is followed that only leads to the next
 ROUGH, ROUGHLY = 1e-2, 15

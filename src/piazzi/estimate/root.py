@@ -10,12 +10,12 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.guarded import Guard
-from piazzi.estimate.inputs import Inputs, prepare, scratch
 from piazzi.estimate.kalman import check_start
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs, prepare
 
 MOST_LANES = 16
 
@@ -55,7 +55,7 @@ class RootKernel:
         A = root.unknowns * n
         # sigma points, rows to be triangularised, sensitivities, joint root, correction, and scratch
         shapes = ((2 * n + MOST_LANES) * n, (A + n) * n, m * A, A * A, A, A, 2 * m)
-        self._space = (*scratch(problem), *self._numbers, *(np.empty(size) for size in shapes))
+        self._space = (*self._numbers, *(np.empty(size) for size in shapes))
 
     def prior_root(self) -> Array:
         """Root of the prior covariance, (n, n)."""

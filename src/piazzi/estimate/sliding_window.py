@@ -10,7 +10,6 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate
-from piazzi.estimate.inputs import Inputs, prepare
 from piazzi.estimate.live_window import LiveWindow, window_opens
 from piazzi.estimate.losses import loss_of
 from piazzi.estimate.robust_window import row_space, row_weights, window_fragments
@@ -18,6 +17,7 @@ from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs, prepare
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def window_space(problem: Problem, inputs: Inputs, begin: Array, work: Array) ->
     newest = np.arange(len(begin))
     W = int((newest - begin).max()) + 1
     rows = int((inputs.first_row[newest + 1] - inputs.first_row[begin]).max()) * M
-    in_epoch = int(np.diff(inputs.first_row).max()) * M
+    in_epoch = inputs.most_rows * M
     Q_all = np.empty((W if problem.noise_varies else 1, N, N))
     return (
         np.empty((W, N)),
@@ -139,9 +139,6 @@ def window_space(problem: Problem, inputs: Inputs, begin: Array, work: Array) ->
         np.empty((in_epoch + N, N + 1)),
         np.empty((W, N)),
         np.empty((W, N)),
-        np.empty(M),
-        np.empty((M, N)),
         work,
-        np.empty((N, N)),
         np.empty((N, N)),
     )

@@ -11,10 +11,11 @@ from piazzi import kernels
 from piazzi.estimate.chain import chain_fragments
 from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate
-from piazzi.estimate.inputs import prepare, scratch
 from piazzi.estimate.kalman import check_start
 from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
+from piazzi.problem.inputs import prepare
 
 
 @dataclass(frozen=True)
@@ -45,11 +46,11 @@ class Smoother:
             Where the tracking does not fit the problem.
         """
         inputs = prepare(problem, tracking)
-        library = kernels.load(problem.spec(*chain_fragments(problem, "smoother")))
+        library = kernels.load(problem.spec(*chain_fragments(problem, "smoother"), lanes=lanes_for(problem.model.n)))
         K, n, (J, m) = inputs.epochs, problem.model.n, inputs.z.shape
         mean, covariance, cross = np.empty((K, n)), np.empty((K, n, n)), np.empty((max(K - 1, 1), n, n))
         nu, S = np.empty((J, m)), np.empty((J, m, m))
-        most = int(np.diff(inputs.first_row).max()) * m
+        most = inputs.most_rows * m
         watch = Stopwatch()
         library.run_smoother(
             K,
@@ -62,7 +63,6 @@ class Smoother:
             problem.process_noise.covariance,
             problem.mean,
             problem.covariance,
-            *scratch(problem),
             np.empty((K, n, n)),
             np.empty((K if problem.noise_varies else 1, n, n)),
             np.empty((J, m)),
@@ -70,7 +70,6 @@ class Smoother:
             np.empty((K, n)),
             np.empty((K, n, n)),
             np.empty((most, n + 1)),
-            np.empty((n, n)),
             np.empty((n, n)),
             int(self.cross_covariances),
             mean,

@@ -9,10 +9,10 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.estimator import Estimate, Estimator
-from piazzi.estimate.inputs import prepare, scratch
 from piazzi.estimate.kalman import ExtendedKalmanFilter, update_fragments
 from piazzi.problem import Problem, ProcessNoise, Tracking, Truth
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import prepare
 from piazzi.simulation import simulate, true_problem
 
 FINER = 4  # times as many substeps stand for the truth: even at order 1 that leaves a quarter of the error unseen
@@ -93,7 +93,6 @@ def substep_error(problem: Problem, tracking: Any) -> StepError:
         problem.process_noise.covariance,
         problem.mean,
         problem.covariance,
-        *scratch(problem),
         bias,
         P,
     )

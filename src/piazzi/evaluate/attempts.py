@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from piazzi.estimate import Estimator, ExtendedKalmanFilter, FactorGraph
-from piazzi.estimate.inputs import prepare
 from piazzi.evaluate.bounds import full_truth, posterior_bounds
 from piazzi.evaluate.information import coast
 from piazzi.evaluate.metrics import rms_in_sigmas
@@ -17,6 +16,7 @@ from piazzi.evaluate.quantities import finite
 from piazzi.evaluate.twins import Twin
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import prepare
 
 TRIED: dict[str, Estimator] = {"ekf": ExtendedKalmanFilter(), "graph": FactorGraph()}
 

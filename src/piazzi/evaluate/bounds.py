@@ -9,9 +9,9 @@ import numpy as np
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
 from piazzi.estimate.factor_graph import DIFFUSE, with_first
-from piazzi.estimate.inputs import Inputs, prepare, with_prior_node
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs, prepare, with_prior_node
 
 _BLOCK = 1 << 12  # epochs worked on at once: their matrices stay in the processor's cache
 

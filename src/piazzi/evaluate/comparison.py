@@ -10,7 +10,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from piazzi.estimate import Estimate, Estimator
-from piazzi.estimate.inputs import prepare
 from piazzi.estimate.registry import views_of
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
 from piazzi.evaluate.display import html, render
@@ -18,6 +17,7 @@ from piazzi.evaluate.grids import as_text
 from piazzi.evaluate.honesty import LONGEST
 from piazzi.evaluate.rows import Row, evaluate
 from piazzi.problem import Problem, Tracking
+from piazzi.problem.inputs import prepare
 
 if TYPE_CHECKING:
     import xarray

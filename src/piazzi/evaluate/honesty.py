@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from piazzi.estimate import Estimate
-from piazzi.estimate.inputs import prepare
 from piazzi.evaluate.bounds import Linearized, absorb, linearized, linearized_rows
 from piazzi.evaluate.consistency import Check, bias_check, nees_check, nis_check, whiteness_check
 from piazzi.evaluate.metrics import Consistency, used
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import prepare
 
 LONGEST = 300_000  # epochs from which NEES is not tested: it would take more memory than the estimators do
 
@@ -124,7 +124,7 @@ def own_innovations(estimate: Estimate, found: Linearized | None) -> Array:
     """
     inputs = prepare(estimate.problem, estimate.tracking)
     nu = np.where(used(estimate), estimate.innovations, np.nan)
-    if found is None or int(np.diff(inputs.first_row).max()) == 1:
+    if found is None or inputs.most_rows == 1:
         return standardized(nu, estimate.innovation_covariances)
     if estimate.view == "delayed":
         return np.where(np.isnan(nu), np.nan, found.whitened)

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.inputs import Inputs
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs
 
 _BLOCK = 1 << 14  # rows factored at a time
 # singular values below this share of the largest are rounding errors of the rows
@@ -84,9 +84,6 @@ def _observe(problem: Problem, inputs: Inputs, states: Array, *, follow: bool) -
         problem.process_noise.covariance,
         int(follow),
         states,
-        np.empty(M),
-        np.empty((M, N)),
-        np.empty(M * (M + N)),
         innovations,
         rows,
     )

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.estimate import FactorGraph
-from piazzi.estimate.inputs import Inputs, prepare
 from piazzi.evaluate.attempts import Attempt, attempts
 from piazzi.evaluate.bounds import full_truth
 from piazzi.evaluate.grids import as_text
@@ -21,6 +20,7 @@ from piazzi.evaluate.verdict import verdict, weakest
 from piazzi.model import Sensor
 from piazzi.problem import Problem, ProcessNoise, Station, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs, prepare
 
 if TYPE_CHECKING:
     import xarray

@@ -8,10 +8,10 @@ from itertools import combinations, permutations, product
 
 import numpy as np
 
-from piazzi.estimate.inputs import Inputs
 from piazzi.evaluate.information import coast, factor, from_first, predicted
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs
 
 LISTED = 1.0  # RMS difference, in sigma of a measurement, up to which another solution is worth telling
 SAME = 3.0  # solutions whose measurements differ by less than this many sigma in all, to first order, are one

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.estimate import FactorGraph, SlidingWindow
-from piazzi.estimate.inputs import prepare
 from piazzi.evaluate.bounds import Bounds
 from piazzi.evaluate.comparison import bounds_of, failed
 from piazzi.evaluate.grids import as_text
@@ -18,6 +17,7 @@ from piazzi.evaluate.quantities import finite
 from piazzi.evaluate.rows import Row, evaluate
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import prepare
 
 if TYPE_CHECKING:
     import xarray

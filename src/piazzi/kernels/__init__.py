@@ -2,6 +2,7 @@
 
 from piazzi.kernels.cache import build_seconds, load
 from piazzi.kernels.integrators import Discrete, DormandPrince, Integrator, Kepler, Taylor
+from piazzi.kernels.library import Ready, ready
 from piazzi.kernels.runge_kutta import (
     DormandPrince5,
     Euler,
@@ -27,10 +28,12 @@ __all__ = [
     "KernelSpec",
     "Midpoint",
     "Ralston",
+    "Ready",
     "RungeKutta",
     "RungeKutta4",
     "RungeKutta8",
     "Taylor",
     "build_seconds",
     "load",
+    "ready",
 ]

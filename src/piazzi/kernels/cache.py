@@ -21,6 +21,9 @@ from piazzi.kernels.spec import KernelSpec
 
 LOGGER = logging.getLogger("piazzi.kernels")
 MANIFEST = "manifest.json"
+# PIAZZI_JIT is read at every run, and the usual way takes as long as the rest of finding a kernel
+_environment: Any = getattr(os.environ, "_data", os.environ)
+_JIT, _OFF = ("PIAZZI_JIT", "0") if _environment is os.environ else map(os.environ.encodekey, ("PIAZZI_JIT", "0"))
 _spent: list[float] = []
 _loaded: dict[tuple[KernelSpec, bool], SimpleNamespace] = {}
 
@@ -30,7 +33,7 @@ def load(spec: KernelSpec) -> SimpleNamespace:
 
     A first build logs one line at level INFO on the logger ``piazzi.kernels``.
     """
-    compiled = os.environ.get("PIAZZI_JIT", "1") != "0"
+    compiled = _environment.get(_JIT) != _OFF
     found = _loaded.get((spec, compiled))
     if found is None:
         started = time.perf_counter()

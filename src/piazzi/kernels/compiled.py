@@ -12,10 +12,12 @@ from piazzi.kernels.compiler import EntryPipeline
 from piazzi.kernels.lanes import (
     alike,
     ceil,
+    fused,
     gathered,
     heaviside,
     identity,
     load_lanes,
+    load_matrices,
     load_matrix,
     load_packs,
     load_vector,
@@ -23,7 +25,9 @@ from piazzi.kernels.lanes import (
     maximum,
     minimum,
     outer,
+    plus_outer,
     scattered,
+    scratch,
     sign,
     store,
     store_lanes,
@@ -32,6 +36,7 @@ from piazzi.kernels.lanes import (
     vector,
 )
 from piazzi.kernels.lanes.elementary import HELPER, OPTIONS, acos, asin, atan, atan2, cos, exp, log, sin, tan
+from piazzi.kernels.lanes.pieces import choose
 from piazzi.kernels.plain import unless_missing as _unless_missing
 
 Array = types.CPointer(types.float64)

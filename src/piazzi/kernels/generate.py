@@ -1,6 +1,7 @@
 """A model's equations -> the source of its functions, specialised for its sizes.  Needs SymPy; runs when nothing is cached.
 
-Sizes: `ND` states, `N` values with the estimated constants, `M` components of the widest sensor.  The functions:
+Sizes: `ND` states, `N` values with the estimated constants, `M` components of the widest sensor; `MN`, `NN`, and `WORK` for
+the factors of an update.  The functions:
 
 * ``dynamics(t, x, p)``, ``rhs(t, x, R, p)``: dx/dt, and with it dR/dt = F R for the first `ND` rows of a transition matrix
 * ``substep(t, h, x, p)``, ``substep_jacobian(t, h, x, R, p)``: one step of the integrator; with its derivative times R
@@ -34,6 +35,10 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
         "ND": len(model.moving),
         "N": model.n,
         "M": model.width,
+        "MN": model.width * model.n,
+        "NN": model.n**2,
+        "NN_LANES": model.n**2 * lanes,
+        "WORK": model.width * (model.width + model.n),
         "NUMBERS": model.most_numbers,
         "GIVEN": max(len(model.given), 1),
     }
@@ -87,12 +92,14 @@ class _Jacobian:
 
     def row_times(self, i: int, rows: Sequence[str], width: int) -> str:
         """Row i of the product with the matrix of those rows."""
-        terms = []
+        total = ""
         for j, row in enumerate(rows):
             e = self.entry(i, j)
-            if e:
-                terms.append(row if e == "1.0" else f"{e}*{row}")
-        return " + ".join(terms) if terms else f"unit(-1, {width})"
+            if e and total:
+                total = f"{total} + {row}" if e == "1.0" else f"fused({e}, {row}, {total})"
+            elif e:
+                total = row if e == "1.0" else f"{e}*{row}"
+        return total or f"unit(-1, {width})"
 
     def dense_row(self, i: int) -> str:
         return "vector(" + ", ".join(self.entry(i, j) or "0.0" for j in range(self.matrix.cols)) + ")"

@@ -60,9 +60,19 @@ def matrix(*rows: Array) -> Array:
     return np.array(rows, dtype=float)
 
 
+def fused(s: float, x: Array, y: Array) -> Array:
+    """s x + y."""
+    return s * x + y
+
+
 def outer(u: Array, v: Array) -> Array:
     """The matrix u v^T."""
     return np.outer(u, v)
+
+
+def plus_outer(A: Array, u: Array, v: Array) -> Array:
+    """A + u v^T."""
+    return np.asarray(A + np.outer(u, v))
 
 
 def unit(i: int, n: int) -> Array:
@@ -73,6 +83,11 @@ def unit(i: int, n: int) -> Array:
 def identity(n: int) -> Array:
     """The identity of size `n`."""
     return np.eye(n)
+
+
+def scratch(n: int) -> Array:
+    """Work space of `n` numbers: not numbers yet, so that reading one too early shows."""
+    return np.full(n, nan)
 
 
 def load_vector(a: Array, at: int, n: int) -> Array:
@@ -93,6 +108,11 @@ def store(a: Array, at: int, value: Array) -> None:
 def load_lanes(a: Array, at: int, n: int, stride: int, w: int) -> Array:
     """The vector of `n` numbers at `at`: uncompiled code works on one problem at a time."""
     return load_vector(a, at, n)
+
+
+def load_matrices(a: Array, at: int, r: int, n: int, stride: int, w: int) -> Array:
+    """The matrix of `r` rows of `n` numbers at `at`."""
+    return load_matrix(a, at, r, n)
 
 
 def store_lanes(a: Array, at: int, stride: int, value: Array) -> None:
@@ -118,6 +138,11 @@ def sign(x: float) -> float:
 def heaviside(x: float) -> float:
     """1 above zero, 0 below, 1/2 at zero: the derivative of max(x, 0)."""
     return 0.5 + 0.5 * sign(x)
+
+
+def choose(x: float, y: float, yes: float, no: float) -> float:
+    """`yes` where x is larger than y, else `no`."""
+    return yes if x > y else no
 
 
 def maximum(x: float, y: float) -> float:

@@ -12,6 +12,10 @@ from piazzi.kernels.plain import *  # noqa: F403
 ND: int
 N: int
 M: int
+MN: int
+NN: int
+NN_LANES: int
+WORK: int
 NUMBERS: int
 LANES: int
 GIVEN: int

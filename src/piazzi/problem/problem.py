@@ -20,8 +20,8 @@ from piazzi.problem.constants import with_station_constants
 from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
 from piazzi.problem.two_body import check_orbit_axes, check_two_body
 
-MOST_SPECS = 1000  # beyond so many, the memory of specifications starts anew
-_SPECS: dict[tuple[tuple[Any, ...], tuple[str, ...], int], KernelSpec] = {}
+MOST_KINDS = 100  # beyond so many kinds of problem, the memory of their specifications starts anew
+_SPECS: dict[tuple[Any, ...], dict[tuple[tuple[str, ...], int], KernelSpec]] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +83,10 @@ class Problem:
         self._lay_out()
         if isinstance(self.integrator, Kepler):
             check_two_body(self, self.integrator)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the specifications of kernels, which this process shares among problems."""
+        return {name: value for name, value in self.__dict__.items() if name != "_specs"}
 
     # ---- checks --------------------------------------------------------------------------------------------------
 
@@ -167,7 +171,7 @@ class Problem:
 
     def _lay_out(self) -> None:
         """Make the arrays now, so that no run has to."""
-        for name in ("mean", "covariance", "given", "narrowest", "considered", "_traits"):
+        for name in ("mean", "covariance", "given", "narrowest", "considered", "is_correlated", "noise_fragment", "_specs"):
             getattr(self, name)
         for name in ("sensor", "noise", "correlated", "numbers"):
             getattr(self, f"station_{name}")
@@ -235,6 +239,11 @@ class Problem:
         return np.array([not _is_diagonal(s.noise) for s in self.stations], dtype=np.int64)
 
     @cached_property
+    def is_correlated(self) -> bool:
+        """Whether the R of any station is not diagonal."""
+        return bool(self.station_correlated.any())
+
+    @cached_property
     def station_numbers(self) -> Array:
         """Each station's own numbers in alphabetical order, (S, widest)."""
         out = np.zeros((len(self.stations), self.model.most_numbers))
@@ -247,22 +256,23 @@ class Problem:
     def spec(self, *fragments: str, lanes: int = 1) -> KernelSpec:
         """The compiled module with these fragments, for this model, integrator, kind of noise, and manoeuvres or none."""
         assert self.integrator is not None
-        key = (self._traits, fragments, lanes)
-        spec = _SPECS.get(key)
+        key = (fragments, lanes)
+        spec = self._specs.get(key)
         if spec is None:
-            if len(_SPECS) > MOST_SPECS:
-                _SPECS.clear()
-            spec = _SPECS[key] = KernelSpec(self.model, self.integrator.scheme, composed(self, fragments, lanes), lanes)
+            spec = self._specs[key] = KernelSpec(self.model, self.integrator.scheme, composed(self, fragments, lanes), lanes)
         return spec
 
     @cached_property
-    def _traits(self) -> tuple[Any, ...]:
-        """What the choice of fragments depends on: problems that share it share the specifications of their kernels."""
+    def _specs(self) -> dict[tuple[tuple[str, ...], int], KernelSpec]:
+        """Specifications of kernels so far, shared with all problems for which the choice of fragments comes out the same."""
         integrator, events = self.integrator, bool(self.manoeuvres)
         assert integrator is not None
-        return self.model, type(integrator), integrator.scheme, events, self.process_noise.axes, self.noise_varies
+        traits = self.model, type(integrator), integrator.scheme, events, self.process_noise.axes, self.noise_varies
+        if len(_SPECS) > MOST_KINDS:
+            _SPECS.clear()
+        return _SPECS.setdefault(traits, {})
 
-    @property
+    @cached_property
     def noise_fragment(self) -> str:
         return "noise_integral" if self._integrated else "noise_scaled"
 

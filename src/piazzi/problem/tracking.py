@@ -60,6 +60,10 @@ class Tracking:
         if self.truth is not None:
             put(self, "truth", self._checked_truth())
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what `prepare` keeps: it belongs to one problem in one process."""
+        return {name: value for name, value in self.__dict__.items() if name != "_prepared"}
+
     def _checked_times(self) -> Array:
         times = numeric(self.row_times, "times").reshape(-1)
         if not times.size:

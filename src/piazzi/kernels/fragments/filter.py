@@ -21,14 +21,12 @@ def run_filter(
     Q: Array,
     x0: Array,
     P0: Array,
-    nu: Array,
-    H: Array,
-    work: Array,
     mean: Array,
     covariance: Array,
     innovation: Array,
     innovation_covariance: Array,
 ) -> None:
+    nu, H, work = scratch(M), scratch(MN), scratch(WORK)
     x = load_vector(x0, 0, N)
     P = load_matrix(P0, 0, N, N)
     Q_unit = load_matrix(Q, 0, N, N)

@@ -21,9 +21,6 @@ def run_guarded_filter(
     Q: Array,
     x0: Array,
     P0: Array,
-    nu: Array,
-    H: Array,
-    work: Array,
     iterations: int,
     gate: Array,
     rejected: Indices,
@@ -32,6 +29,7 @@ def run_guarded_filter(
     innovation: Array,
     innovation_covariance: Array,
 ) -> None:
+    nu, H, work = scratch(M), scratch(MN), scratch(WORK)
     x = load_vector(x0, 0, N)
     P = load_matrix(P0, 0, N, N)
     Q_unit = load_matrix(Q, 0, N, N)

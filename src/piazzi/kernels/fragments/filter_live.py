@@ -22,9 +22,6 @@ def live_update(
     R: Array,
     correlated: Indices,
     p: Array,
-    nu: Array,
-    H: Array,
-    work: Array,
     x_pred: Array,
     P_pred: Array,
     d: Array,
@@ -34,6 +31,7 @@ def live_update(
     innovation: Array,
     innovation_covariance: Array,
 ) -> None:
+    nu, H, work = scratch(M), scratch(MN), scratch(WORK)
     s = which[0]
     x = load_vector(x_pred, 0, N)
     innovate(sensor[s], clock[3], x, p, numbers, s * NUMBERS, z, 0, nu, H, 0)

@@ -14,9 +14,6 @@ def live_update_guarded(
     R: Array,
     correlated: Indices,
     p: Array,
-    nu: Array,
-    H: Array,
-    work: Array,
     iterations: int,
     gate: Array,
     rejected: Indices,
@@ -27,6 +24,7 @@ def live_update_guarded(
     innovation: Array,
     innovation_covariance: Array,
 ) -> None:
+    nu, H, work = scratch(M), scratch(MN), scratch(WORK)
     x, P = update_epoch_guarded(
         0,
         rows,

@@ -29,9 +29,6 @@ def run_root_filter(
     Q: Array,
     x0: Array,
     U: Array,
-    nu: Array,
-    H: Array,
-    work: Array,
     settings: Array,
     gate: Array,
     points: Array,
@@ -47,6 +44,7 @@ def run_root_filter(
     innovation: Array,
     innovation_covariance: Array,
 ) -> None:
+    nu, H, work = scratch(M), scratch(MN), scratch(WORK)
     x = load_vector(x0, 0, N)
     Q_unit = load_matrix(Q, 0, N, N)
     before = t_prior

@@ -21,7 +21,6 @@ def graph_solve(
     nu: Array,
     H: Array,
     tether: Array,
-    damping: float,
     d_pred: Array,
     P_pred: Array,
     P_last: Array,
@@ -29,6 +28,7 @@ def graph_solve(
     multiplier: Array,
     dx: Array,
     report: Array,
+    damping: float,
 ) -> None:
     m_now = load_vector(m, 0, N)
     P_first = load_matrix(P0, 0, N, N)
@@ -70,8 +70,6 @@ def graph_marginals(
     H: Array,
     P_pred: Array,
     P_last: Array,
-    L: Array,
-    X: Array,
     keep_cross: int,
     dx: Array,
     covariance: Array,
@@ -79,9 +77,7 @@ def graph_marginals(
     report: Array,
 ) -> None:
     last = load_matrix(P_last, 0, N, N)
-    marginal_covariances(
-        0, K, scale, first_row, Q_matrix(Q), Q_all, Phi, nu, H, P_pred, last, L, X, keep_cross, covariance, cross
-    )
+    marginal_covariances(0, K, scale, first_row, Q_matrix(Q), Q_all, Phi, nu, H, P_pred, last, keep_cross, covariance, cross)
     largest = 0.0
     for j in range(K):
         for i in range(N):

@@ -59,14 +59,11 @@ def graph_linearize(
     Q_all: Array,
     nu: Array,
     H: Array,
-    work: Array,
     tether: Array,
-    L: Array,
-    D: Array,
-    y: Array,
     broken: Array,
     report: Array,
 ) -> None:
+    work, L, D, y = scratch(WORK), scratch(NN), scratch(N), scratch(N)
     for i in range(4):
         report[i] = 0.0
     linearize_dynamics(0, K, t, count, scale, p, Q_matrix(Q), x, f, Phi, Q_all)
@@ -98,11 +95,11 @@ def graph_innovations(
     x: Array,
     d_pred: Array,
     P_pred: Array,
-    nu: Array,
-    H: Array,
+    step: int,
     innovation: Array,
     innovation_covariance: Array,
 ) -> None:
+    nu, H = scratch(M), scratch(MN)
     for k in range(K):
         record_epoch(
             k,
@@ -115,8 +112,8 @@ def graph_innovations(
             R,
             p,
             load_vector(x, k * N, N),
-            load_vector(d_pred, k * N, N),
-            load_matrix(P_pred, k * N * N, N, N),
+            load_vector(d_pred, k * step * N, N),
+            load_matrix(P_pred, k * step * N * N, N, N),
             nu,
             H,
             innovation,

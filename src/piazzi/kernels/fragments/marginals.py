@@ -34,7 +34,7 @@ def information_before(first, last, nu, H, Y):
 
 
 @inline
-def forget(Y, T, noise, amount):
+def forget(Y, T, noise, amount, keep_cross):
     """Information about a state as information about the one it had been without its process noise; T collects the steps.
 
     One direction g of the noise at a time: (I - k g^T) Y (I - g k^T) + k k^T with k = Y g / (1 + g^T Y g).
@@ -46,35 +46,70 @@ def forget(Y, T, noise, amount):
             k = (1.0 / (1.0 + g @ u)) * u
             B = Y - outer(u, k)
             Y = B + outer(k, k - g @ B)
-            T = T - outer(T @ g, k)
+            if keep_cross:
+                T = T - outer(T @ g, k)
     return Y, T
 
 
 @inline
-def marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P_last, rows, g, keep_cross, covariance, cross):
-    """Covariance of each state a ... a + W - 1 into its place; of state k with state k + 1 into `cross` where wanted."""
+def inform(at, predicted, stride, P_pred, covariance, rows):
+    """Covariances of `LANES` states, at `at`, `at + stride`, ..., in the place of their information, in Joseph form.
+
+    Each predicted covariance (the first is at `predicted`) takes the information in as measurements of unit noise: the rows
+    of `directions`, one after the other as they become known.
+    """
+    for i in range(N):
+        store_packs(rows, i * N * LANES, load_lanes(covariance, at + i * N, N, stride, LANES), LANES)
+    P = load_matrices(P_pred, predicted, N, N, stride, LANES)
+    for j in range(N):
+        whole = load_packs(rows, (j * N + j) * LANES, 1, LANES)[0]
+        row = load_packs(rows, j * N * LANES, N, LANES)
+        for k in range(j):
+            row = row - load_packs(rows, (k * N + j) * LANES, 1, LANES)[0] * load_packs(rows, k * N * LANES, N, LANES)
+        store_packs(rows, j * N * LANES, row, LANES)
+        pivot = load_packs(rows, (j * N + j) * LANES, 1, LANES)[0]
+        h = choose(pivot, 1e-15 * whole, 1.0 / sqrt(pivot), 0.0) * row
+        store_packs(rows, j * N * LANES, h, LANES)
+        Ph = h @ P
+        K = (1.0 / (h @ Ph + 1.0)) * Ph
+        B = plus_outer(P, -Ph, K)
+        P = plus_outer(B, K, K - h @ B)
+    store_lanes(covariance, at, stride, symmetric(P))
+
+
+@inline
+def marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P_last, keep_cross, covariance, cross):
+    """Covariance of each state a ... a + W - 1 into its place; of state k with state k + 1 into `cross` where wanted.
+
+    Information is carried back from state to state, and kept where the covariance will be; what it does to the predicted
+    covariance of each state depends on no other state, so `LANES` of them are worked on together.
+    """
     base = first_row[a]
-    store(covariance, (a + W - 1) * N * N, symmetric(P_last))
-    Y = 0.0 * P_last
+    rows, g = scratch(NN_LANES), scratch(NN)
+    last = (first_row[a + W - 1] - base) * M
+    Y = information_before(last, (first_row[a + W] - base) * M, nu, H, 0.0 * P_last)
     directions(Q, g)
     for b in range(1, W):
         j = W - 1 - b
         k = a + j
-        Y = information_before((first_row[k + 1] - base) * M, (first_row[k + 2] - base) * M, nu, H, Y)
         amount = scale[k + 1]
         if noise_varies():
             directions(noise_at(j + 1, amount, Q, Q_all), g)
             amount = 1.0
-        Y, T = forget(Y, identity(N), g, amount)
+        Y, T = forget(Y, identity(N), g, amount, keep_cross)
         F = load_matrix(Phi, j * N * N, N, N)
         Y = symmetric(F.T @ Y @ F)
-        P = load_matrix(P_pred, j * N * N, N, N)
-        _, P, _ = absorb_epoch((first_row[k] - base) * M, (first_row[k + 1] - base) * M, unit(-1, N), P, nu, H)
-        directions(Y, rows)
-        for i in range(N):
-            if rows[i * N + i] > 0.0:
-                _, P, _, _, _ = update_scalar(unit(-1, N), P, load_vector(rows, i * N, N), 0.0)
-        P = symmetric(P)
-        store(covariance, k * N * N, P)
+        Y = information_before((first_row[k] - base) * M, (first_row[k + 1] - base) * M, nu, H, Y)
+        store(covariance, k * N * N, Y)
         if keep_cross:
-            store(cross, k * N * N, P @ (T @ F).T)
+            store(cross, k * N * N, T @ F)
+    j = 0
+    while j < W - 1:
+        together = LANES if j + LANES < W else 1
+        inform((a + j) * N * N, j * N * N, N * N if together > 1 else 0, P_pred, covariance, rows)
+        j += together
+    store(covariance, (a + W - 1) * N * N, symmetric(P_last))
+    if keep_cross:
+        for k in range(a, a + W - 1):
+            P = load_matrix(covariance, k * N * N, N, N)
+            store(cross, k * N * N, P @ load_matrix(cross, k * N * N, N, N).T)

@@ -39,12 +39,10 @@ def observe(
     Q: Array,
     follow: int,
     x: Array,
-    nu: Array,
-    H: Array,
-    L: Array,
     innovation: Array,
     root: Array,
 ) -> None:
+    nu, H, L = scratch(M), scratch(MN), scratch(WORK)
     Q_unit = load_matrix(Q, 0, N, N)
     y = load_vector(x, 0, N)
     W = identity(N)

@@ -26,9 +26,6 @@ def run_smoother(
     Q: Array,
     x0: Array,
     P0: Array,
-    nu_row: Array,
-    H_row: Array,
-    work: Array,
     Phi: Array,
     Q_all: Array,
     nu: Array,
@@ -37,7 +34,6 @@ def run_smoother(
     P_pred: Array,
     gains: Array,
     rows: Array,
-    directions_of_noise: Array,
     keep_cross: int,
     mean: Array,
     covariance: Array,
@@ -45,6 +41,7 @@ def run_smoother(
     innovation: Array,
     innovation_covariance: Array,
 ) -> None:
+    nu_row, H_row, work = scratch(M), scratch(MN), scratch(WORK)
     x = load_vector(x0, 0, N)
     P = load_matrix(P0, 0, N, N)
     Q_unit = Q_matrix(Q)
@@ -91,6 +88,4 @@ def run_smoother(
         lam = lam @ load_matrix(Phi, (j - 1) * N * N, N, N)
         filtered = load_vector(mean, (j - 1) * N, N)
         store(mean, (j - 1) * N, filtered - lam @ load_matrix(covariance, (j - 1) * N * N, N, N))
-    marginal_covariances(
-        0, K, scale, first_row, Q_unit, Q_all, Phi, nu, H, P_pred, P, rows, directions_of_noise, keep_cross, covariance, cross
-    )
+    marginal_covariances(0, K, scale, first_row, Q_unit, Q_all, Phi, nu, H, P_pred, P, keep_cross, covariance, cross)

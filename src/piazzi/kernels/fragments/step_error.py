@@ -22,12 +22,10 @@ def run_step_error(
     Q: Array,
     x0: Array,
     P0: Array,
-    nu: Array,
-    H: Array,
-    work: Array,
     bias_out: Array,
     covariance_out: Array,
 ) -> None:
+    nu, H, work = scratch(M), scratch(MN), scratch(WORK)
     x = load_vector(x0, 0, N)
     P = load_matrix(P0, 0, N, N)
     Q_unit = load_matrix(Q, 0, N, N)

@@ -13,14 +13,12 @@ def update_once(
     R: Array,
     correlated: Indices,
     p: Array,
-    nu: Array,
-    H: Array,
-    work: Array,
     mean: Array,
     covariance: Array,
     innovation: Array,
     innovation_covariance: Array,
 ) -> None:
+    nu, H, work = scratch(M), scratch(MN), scratch(WORK)
     x = load_vector(mean, 0, N)
     P = load_matrix(covariance, 0, N, N)
     innovate(sensor[s], t, x, p, numbers, s * NUMBERS, z, 0, nu, H, 0)

@@ -33,11 +33,8 @@ def run_window(
     gains: Array,
     multiplier: Array,
     dx: Array,
-    nu_row: Array,
-    H_row: Array,
     work: Array,
     L: Array,
-    X: Array,
     x: Array,
     delayed_covariance: Array,
     mean: Array,
@@ -45,6 +42,7 @@ def run_window(
     innovation: Array,
     innovation_covariance: Array,
 ) -> None:
+    nu_row, H_row = scratch(M), scratch(MN)
     Q = Q_matrix(Q_flat)
     m = load_vector(m0, 0, N)
     P = load_matrix(P0, 0, N, N)
@@ -100,6 +98,4 @@ def run_window(
         store(mean, k * N, load_vector(x, k * N, N))
         store(covariance, k * N * N, P_new)
         if k + 1 == K or begin[k + 1] > a + 1:
-            marginal_covariances(
-                a, k - a + 1, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P_new, L, X, 0, delayed_covariance, L
-            )
+            marginal_covariances(a, k - a + 1, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P_new, 0, delayed_covariance, L)

@@ -61,11 +61,8 @@ def live_settle(
     gains: Array,
     multiplier: Array,
     dx: Array,
-    nu_row: Array,
-    H_row: Array,
     work: Array,
     L: Array,
-    X: Array,
     x: Array,
     delayed_covariance: Array,
     covariance: Array,
@@ -73,6 +70,7 @@ def live_settle(
     innovation_covariance: Array,
     all_covariances: int,
 ) -> None:
+    nu_row, H_row = scratch(M), scratch(MN)
     P_new = settle(
         a,
         k,
@@ -113,5 +111,5 @@ def live_settle(
     store(covariance, 0, P_new)
     if all_covariances:
         marginal_covariances(
-            a, k - a + 1, scale, first_row, Q_matrix(Q), Q_all, Phi, nu, H, P_pred, P_new, L, X, 0, delayed_covariance, L
+            a, k - a + 1, scale, first_row, Q_matrix(Q), Q_all, Phi, nu, H, P_pred, P_new, 0, delayed_covariance, L
         )

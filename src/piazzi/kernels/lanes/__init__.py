@@ -1,6 +1,5 @@
 """Small vectors and matrices in SIMD registers, for Numba."""
 
-import piazzi.kernels.lanes.operators  # noqa: F401  (registers + - * @ with Numba)
 from piazzi.kernels.lanes.functions import ceil, heaviside, maximum, minimum, sign
 from piazzi.kernels.lanes.kinds import Matrix, Pack, Vector, element
 from piazzi.kernels.lanes.memory import (
@@ -8,18 +7,22 @@ from piazzi.kernels.lanes.memory import (
     gathered,
     identity,
     load_lanes,
+    load_matrices,
     load_matrix,
     load_packs,
     load_vector,
     matrix,
     outer,
+    plus_outer,
     scattered,
+    scratch,
     store,
     store_lanes,
     store_packs,
     unit,
     vector,
 )
+from piazzi.kernels.lanes.operators import fused
 
 __all__ = [
     "Matrix",
@@ -28,10 +31,12 @@ __all__ = [
     "alike",
     "ceil",
     "element",
+    "fused",
     "gathered",
     "heaviside",
     "identity",
     "load_lanes",
+    "load_matrices",
     "load_matrix",
     "load_packs",
     "load_vector",
@@ -39,7 +44,9 @@ __all__ = [
     "maximum",
     "minimum",
     "outer",
+    "plus_outer",
     "scattered",
+    "scratch",
     "sign",
     "store",
     "store_lanes",

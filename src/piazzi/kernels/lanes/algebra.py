@@ -7,7 +7,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba.core import types
-from numba.core.cgutils import alloca_once, for_range
+from numba.core.cgutils import alloca_once, for_range, get_or_insert_function
 
 from piazzi.kernels.lanes.kinds import DOUBLE, FUSE, INDEX, Matrix, Pack, Vector, element, llvm_type
 
@@ -84,26 +84,81 @@ def scale(b: Any, s: Any, x: Any) -> Any:
     return zipped(b, times, x)
 
 
+def fused_sum(b: Any, x: Any, y: Any, z: Any) -> Any:
+    """x y + z, registers all: rounded once where the processor can.
+
+    Said in one piece, because of a sum of two products the compiler fuses either one, and may choose otherwise in lanes.
+    """
+    kind = z.type
+    suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64"
+    callee = get_or_insert_function(b.module, ir.FunctionType(kind, [kind] * 3), f"llvm.fmuladd.{suffix}")
+    return b.call(callee, [x, y, z])
+
+
+def scaled_sum(b: Any, s: Any, x: Any, y: Any) -> Any:
+    """The element `s` times everything in `x`, plus `y`, fused."""
+
+    def times_plus(register: Any, other: Any) -> Any:
+        factor = s if s.type == register.type else splat(b, s, register.type.count)
+        return fused_sum(b, factor, register, other)
+
+    return zipped(b, times_plus, x, y)
+
+
 def combine(b: Any, coefficients: Sequence[Any], rows: Sequence[Any]) -> Any:
     """sum of coefficient * row."""
     total = scale(b, coefficients[0], rows[0])
     for c, row in zip(coefficients[1:], rows[1:], strict=True):
-        total = add(b, total, scale(b, c, row))
+        total = scaled_sum(b, c, row, total)
     return total
 
 
-def total(b: Any, v: Any) -> Any:
-    """The sum of a register's entries, by halves."""
-    n, undefined = v.type.count, ir.Constant(v.type, ir.Undefined)
+def _piece(b: Any, v: Any, start: int, count: int) -> Any:
+    """So many entries of a register from one on, as a register."""
+    places = ir.Constant(ir.VectorType(INDEX, count), list(range(start, start + count)))
+    return b.shuffle_vector(v, ir.Constant(v.type, ir.Undefined), places)
+
+
+def _halves(b: Any, v: Any) -> tuple[Any, Any]:
+    """The first and the second half of the entries, without the last of an odd number: registers, or lists of lanes."""
+    if isinstance(v, list):
+        return v[: len(v) // 2], v[len(v) // 2 : len(v) // 2 * 2]
+    half = v.type.count // 2
+    return _piece(b, v, 0, half), _piece(b, v, half, half)
+
+
+def _each(op: Callable[..., Any], *args: Any) -> Any:
+    return [op(*entries) for entries in zip(*args, strict=True)] if isinstance(args[0], list) else op(*args)
+
+
+def _size(v: Any) -> int:
+    return len(v) if isinstance(v, list) else int(v.type.count)
+
+
+def _entry(b: Any, v: Any, i: int) -> Any:
+    return v[i] if isinstance(v, list) else get(b, v, i)
+
+
+def _total(b: Any, v: Any) -> Any:
+    """The sum of the entries, by halves."""
+    if _size(v) == 1:
+        return _entry(b, v, 0)
+    both = _total(b, _each(b.fadd, *_halves(b, v)))
+    return b.fadd(both, _entry(b, v, _size(v) - 1)) if _size(v) % 2 else both
+
+
+def dot(b: Any, x: Any, y: Any) -> Any:
+    """The sum of products of the entries of two registers, or of two lists of lanes: the same roundings, so the same bits.
+
+    The products of the second half are fused to those of the first, and the sums taken by halves.
+    """
+    n = _size(x)
     if n == 1:
-        return get(b, v, 0)
-    half = n // 2
-    low, high = (
-        b.shuffle_vector(v, undefined, ir.Constant(ir.VectorType(INDEX, half), list(range(start, start + half))))
-        for start in (0, half)
-    )
-    both = total(b, b.fadd(low, high, flags=FUSE))
-    return b.fadd(both, get(b, v, n - 1), flags=FUSE) if n % 2 else both
+        return b.fmul(_entry(b, x, 0), _entry(b, y, 0), flags=FUSE)
+    (x_low, x_high), (y_low, y_high) = _halves(b, x), _halves(b, y)
+    sums = _each(lambda u, v, low, high: fused_sum(b, u, v, b.fmul(low, high)), x_high, y_high, x_low, y_low)
+    both = _total(b, sums)
+    return fused_sum(b, _entry(b, x, n - 1), _entry(b, y, n - 1), both) if n % 2 else both
 
 
 # rows beyond which products and transposes are loops over memory: registers do not hold them, and straight code is long

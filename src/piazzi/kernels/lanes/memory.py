@@ -6,9 +6,10 @@ from typing import Any
 
 from llvmlite import ir
 from numba.core import types
+from numba.core.cgutils import alloca_once
 from numba.extending import intrinsic
 
-from piazzi.kernels.lanes.algebra import get, join, parts, scale, widen
+from piazzi.kernels.lanes.algebra import get, join, parts, scale, scaled_sum, widen
 from piazzi.kernels.lanes.kinds import DOUBLE, Matrix, Vector, element, lanes_of, llvm_type, wider
 
 
@@ -83,6 +84,20 @@ def outer(typing: Any, u: Any, v: Any) -> Any:
     return result(u, v), lower
 
 
+@intrinsic
+def plus_outer(typing: Any, A: Any, u: Any, v: Any) -> Any:
+    """A + u v^T, fused: the same roundings with lanes and without, whatever else is made of u and v."""
+    result = Matrix(A.r, A.n, max(A.w, v.w))
+    if (A.r, A.n) != (u.n, v.n) or lanes_of(u) != lanes_of(v):
+        return None
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        rows = parts(b, widen(b, A, result, args[0]))
+        return join(b, result, [scaled_sum(b, s, args[2], row) for s, row in zip(parts(b, args[1]), rows, strict=True)])
+
+    return result(A, u, v), lower
+
+
 @intrinsic(prefer_literal=True)
 def unit(typing: Any, i: Any, n: Any) -> Any:
     """Row `i` of the identity of size `n` (all zero where `i` is negative)."""
@@ -105,6 +120,18 @@ def identity(typing: Any, n: Any) -> Any:
 
     result = Matrix(size, size)
     return result(n), lower
+
+
+@intrinsic(prefer_literal=True)
+def scratch(typing: Any, n: Any) -> Any:
+    """Work space of `n` numbers, not set, for the length of the call: what is small ends up in registers."""
+    size = n.literal_value
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        place = alloca_once(b, ir.ArrayType(DOUBLE, max(size, 1)))
+        return b.bitcast(place, DOUBLE.as_pointer())
+
+    return types.CPointer(types.float64)(n), lower
 
 
 def _pointer(b: Any, base: Any, at: Any, register: Any) -> Any:
@@ -176,6 +203,27 @@ def load_lanes(typing: Any, a: Any, at: Any, n: Any, stride: Any, w: Any) -> Any
         return join(b, result, packs)
 
     return result(a, types.intp, n, types.intp, w), lower
+
+
+@intrinsic(prefer_literal=True)
+def load_matrices(typing: Any, a: Any, at: Any, r: Any, n: Any, stride: Any, w: Any) -> Any:
+    """The matrices of `r` rows of `n` numbers at `at`, `at + stride`, ..., one to a lane."""
+    result = Matrix(r.literal_value, n.literal_value, w.literal_value)
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        rows = []
+        for i in range(result.r):
+            start = b.add(args[1], ir.Constant(args[1].type, i * result.n))
+            if result.w == 1:
+                rows.append(b.load(_pointer(b, args[0], start, llvm_type(result.row))))
+                rows[-1].align = 8
+                continue
+            places = [_lane_positions(b, start, args[4], result.w, j) for j in range(result.n)]
+            packs = [join(b, element(result.w), [b.load(b.gep(args[0], [one])) for one in entry]) for entry in places]
+            rows.append(join(b, result.row, packs))
+        return join(b, result, rows)
+
+    return result(a, types.intp, r, n, types.intp, w), lower
 
 
 @intrinsic

@@ -10,16 +10,18 @@ from llvmlite import ir
 from numba.core import types
 from numba.core.imputils import lower_builtin, lower_getattr
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer, infer_getattr, infer_global, signature
+from numba.extending import intrinsic
 
 from piazzi.kernels.lanes.algebra import (
     LOOPED,
     combine,
+    dot,
     get,
     join,
     looped_product,
     parts,
     scale,
-    total,
+    scaled_sum,
     transpose,
     widen,
     zipped,
@@ -82,11 +84,8 @@ def _lower_matmul(b: Any, sig: Any, x: Any, y: Any) -> Any:
     if isinstance(c, Matrix):
         return combine(b, parts(b, x), parts(b, y))
     if isinstance(x.type, ir.VectorType):
-        return total(b, b.fmul(x, y, flags=FUSE))
-    sum_ = b.fmul(get(b, x, 0), get(b, y, 0), flags=FUSE)
-    for i in range(1, a.n):
-        sum_ = b.fadd(sum_, b.fmul(get(b, x, i), get(b, y, i), flags=FUSE), flags=FUSE)
-    return sum_
+        return dot(b, x, y)
+    return dot(b, parts(b, x), parts(b, y))
 
 
 def _lower_plain(name: str) -> Callable[..., Any]:
@@ -121,6 +120,22 @@ _register(operator.sub, _same, _lower_plain("fsub"))
 _register(operator.truediv, _quotient, _lower_plain("fdiv"))
 _register(operator.mul, _product, _lower_times)
 _register(operator.matmul, _matmul, _lower_matmul)
+
+
+@intrinsic
+def fused(typing: Any, s: Any, x: Any, y: Any) -> Any:
+    """s x + y for an element `s`, with one rounding where the processor can: the same one with lanes and without."""
+    kinds = [types.float64 if isinstance(k, types.Number) else k for k in (s, x, y)]
+    same = _same(kinds[1], kinds[2])
+    if same is None or not is_element(s):
+        return None
+    result = wider(same, max(map(lanes_of, kinds)))
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        factor = widen(b, kinds[0], element(lanes_of(result)), args[0])
+        return scaled_sum(b, factor, *(widen(b, have, result, v) for have, v in zip(kinds[1:], args[1:], strict=True)))
+
+    return result(*kinds), lower
 
 
 @infer_global(operator.neg)

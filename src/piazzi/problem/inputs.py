@@ -1,0 +1,103 @@
+"""A problem and its tracking as the flat arrays that every estimator kernel takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from piazzi.kernels import Ready, ready
+from piazzi.problem.checks import Array
+from piazzi.problem.problem import Problem
+from piazzi.problem.tracking import Tracking
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """Arrays of one run.
+
+    Shapes: `t`, `count`, `scale` (K,); `first_row` (K + 1,); `z` (J, M); `station` (J,).  `t_prior` is the time of the prior.
+    """
+
+    t: Array
+    t_prior: float
+    count: Array
+    scale: Array
+    first_row: Array
+    z: Array
+    station: Array
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without addresses of arrays, which mean nothing elsewhere."""
+        return {name: value for name, value in self.__dict__.items() if name != "_run"}
+
+    @property
+    def epochs(self) -> int:
+        return len(self.t)
+
+    @cached_property
+    def most_rows(self) -> int:
+        """Rows of the epoch that has the most."""
+        return int(np.diff(self.first_row).max())
+
+    def measured(self, problem: Problem) -> tuple[Array, ...]:
+        """The arguments that describe the measurements, in the order all kernels share."""
+        return (
+            self.first_row,
+            self.z,
+            self.station,
+            problem.station_sensor,
+            problem.station_numbers,
+            problem.station_noise,
+            problem.station_correlated,
+        )
+
+    def run_of(self, problem: Problem) -> Ready:
+        """The arguments that the kernels of whole filter runs begin with, looked up once for all of them."""
+        kept: tuple[Problem, Ready] | None = self.__dict__.get("_run")
+        if kept is None or kept[0] is not problem:
+            arguments = ready(
+                self.epochs,
+                self.t,
+                self.t_prior,
+                self.count,
+                self.scale,
+                *self.measured(problem),
+                problem.given,
+                problem.process_noise.covariance,
+                problem.mean,
+                problem.covariance,
+            )
+            kept = self.__dict__["_run"] = problem, arguments
+        return kept[1]
+
+
+def prepare(problem: Problem, tracking: Tracking) -> Inputs:
+    """Check that the tracking fits the problem and lay both out, once; raises ValueError where it does not fit.
+
+    The tracking keeps what was laid out for the last problem: estimators that are compared share it.
+    """
+    kept: tuple[Problem, Inputs] | None = tracking.__dict__.get("_prepared")
+    if kept is None or kept[0] is not problem:
+        station = tracking.stations_of(problem)
+        start, count, scale = problem.intervals(tracking.times)
+        z = tracking.padded(problem.model.width)
+        inputs = Inputs(tracking.times, start, count, scale, tracking.first_row, z, station)
+        inputs.run_of(problem)
+        kept = tracking.__dict__["_prepared"] = problem, inputs
+    return kept[1]
+
+
+def with_prior_node(inputs: Inputs) -> Inputs:
+    """The same run with a state, without measurements, at the time of the prior, where that is before the first epoch."""
+    if inputs.t_prior >= inputs.t[0]:
+        return inputs
+    return replace(
+        inputs,
+        t=np.append(inputs.t_prior, inputs.t),
+        count=np.append(np.int64(1), inputs.count),
+        scale=np.append(0.0, inputs.scale),
+        first_row=np.append(np.int64(0), inputs.first_row),
+    )
