@@ -15,8 +15,8 @@ EPOCHS = 200
 
 def figures() -> Iterator[Figure]:
     from piazzi.estimate import chain
-    from piazzi.problem.inputs import prepare
     from piazzi.kernels.spec import lanes_for, machine_lanes
+    from piazzi.problem.inputs import prepare
 
     many = max(machine_lanes(), 2)
     for estimated in (False, True):
