@@ -6,11 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 from cases import recording
-from figures import Figure, cpu_seconds
+from figures import Figure, rounds
 
 import piazzi as pz
 
 RUNS = 1000
+ROUNDS = 3
 LIBRARIES = {"dynamax": "in_dynamax", "cuthbert": "in_cuthbert"}
 BOUND = 20.0
 
@@ -24,12 +25,13 @@ def figures() -> Iterator[Figure]:
     z = tracking.values[None, :, :] + 1e-4 * np.random.default_rng(0).normal(size=(RUNS, *tracking.values.shape))
     layout = Layout(problem, tracking.times)
     filter_runs(layout, z[:8])  # load the compiled code
-    kept: list[np.ndarray] = []
-    ours = float(np.median([cpu_seconds(lambda: kept.append(filter_runs(layout, z)[0])) for _ in range(5)]))
+    runs = {"ours": lambda: filter_runs(layout, z)[0]}
+    runs |= {library: getattr(jax_filters, name)(problem, tracking, z) for library, name in LIBRARIES.items()}
+    last = {library: run() for library, run in runs.items()}
+    times = rounds(runs, ROUNDS)
+    ours = times.pop("ours")
     yield Figure("EKF runs together, CPU time of one", ours / RUNS * 1e3, "ms", note=f"{RUNS} runs, {z.shape[1]} epochs each")
-    for library, name in LIBRARIES.items():
-        run = getattr(jax_filters, name)(problem, tracking, z)
-        theirs = cpu_seconds(lambda run=run: kept.append(run()))
-        apart = float((np.abs(kept[-1] - kept[0]).max(axis=0) / np.abs(kept[0]).max(axis=0)).max())
+    for library, theirs in times.items():
+        apart = float((np.abs(last[library] - last["ours"]).max(axis=0) / np.abs(last["ours"]).max(axis=0)).max())
         note = f"compiled beforehand; last means {apart:.0e} relative apart"
         yield Figure(f"  {library}", theirs / RUNS * 1e3, "ms", "higher", theirs / ours, "ours", BOUND, note=note)

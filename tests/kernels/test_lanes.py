@@ -227,6 +227,7 @@ PACKS: dict[str, tuple[str, Callable[..., np.ndarray]]] = {
     "transpose": ("A.T", lambda A, B, u, v, s, q, C, c, k: A.T),
     "sum with an outer product": ("plus_outer(A, u, v)", lambda A, B, u, v, s, q, C, c, k: A + np.outer(u, v)),
     "outer product added to one problem's": ("plus_outer(C, -u, v)", lambda A, B, u, v, s, q, C, c, k: C - np.outer(u, v)),
+    "mirrored": ("mirrored(A)", lambda A, B, u, v, s, q, C, c, k: np.triu(A) + np.triu(A, 1).T),
     "outer product": ("outer(u, v)", lambda A, B, u, v, s, q, C, c, k: np.outer(u, v)),
     "vector of packs and numbers": ("vector(s, 1.0, q)", lambda A, B, u, v, s, q, C, c, k: np.array([s, 1.0, q])),
     "matrix of both kinds of rows": ("matrix(u, c)", lambda A, B, u, v, s, q, C, c, k: np.array([u, c])),

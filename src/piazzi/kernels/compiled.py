@@ -24,6 +24,7 @@ from piazzi.kernels.lanes import (
     matrix,
     maximum,
     minimum,
+    mirrored,
     outer,
     plus_outer,
     scattered,

@@ -37,6 +37,8 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
         "M": model.width,
         "MN": model.width * model.n,
         "NN": model.n**2,
+        "M_LANES": model.width * lanes,
+        "MN_LANES": model.width * model.n * lanes,
         "NN_LANES": model.n**2 * lanes,
         "WORK": model.width * (model.width + model.n),
         "NUMBERS": model.most_numbers,
@@ -155,7 +157,8 @@ def _taylor_source(model: Model) -> str:
     whole = f"alike(x, {', '.join(results + [f'x[{i}]' for i in range(nd, n)])})"
     used = sorted(set(rates))
     products = [f"K{j} = {F.row_times(j, rows, n)}" for j in used]
-    new = [f"R[{i}] + h*K{i}" if i == j else f"R[{i}] + h*R[{j}] + hh*K{j}" for i, j in enumerate(rates)]
+    products += [f"V{j} = R[{j}] + h*K{j}" for j in used]
+    new = [f"V{i}" if i == j else f"R[{i}] + half*(R[{j}] + V{j})" for i, j in enumerate(rates)]
     return (
         function("scalar_step", arguments, names, list(nxt))
         + function("scalar_step_F", arguments, names, list(nxt) + F.outputs)
@@ -163,7 +166,7 @@ def _taylor_source(model: Model) -> str:
         + _inline(
             "substep_jacobian(t, h, x, R, p)",
             _unpack(results + F.names, f"scalar_step_F({call})"),
-            "hh = 0.5*h*h",
+            "half = 0.5*h",
             *products,
             f"return {whole}, matrix({', '.join(new)})",
         )

@@ -75,6 +75,11 @@ def plus_outer(A: Array, u: Array, v: Array) -> Array:
     return np.asarray(A + np.outer(u, v))
 
 
+def mirrored(A: Array) -> Array:
+    """The symmetric matrix whose upper triangle is that of A."""
+    return np.triu(A) + np.triu(A, 1).T
+
+
 def unit(i: int, n: int) -> Array:
     """Row `i` of the identity of size `n`, all zero where `i` is negative."""
     return np.array([1.0 if j == i else 0.0 for j in range(n)])

@@ -14,6 +14,8 @@ N: int
 M: int
 MN: int
 NN: int
+M_LANES: int
+MN_LANES: int
 NN_LANES: int
 WORK: int
 NUMBERS: int

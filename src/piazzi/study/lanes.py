@@ -165,7 +165,7 @@ def filter_runs(
     bound of each run.
     """
     problem = layout.problem
-    M, (J, m), K, n = len(z), z.shape[1:], len(layout.times), problem.model.n
+    M, J, K, n = len(z), z.shape[1], len(layout.times), problem.model.n
     start, count, scale = problem.intervals(layout.times)
     lanes, groups = lane_count(), len(layout.member)
     scored = truth is not None
@@ -201,9 +201,6 @@ def filter_runs(
         states,
         layout.member,
         groups,
-        np.empty(m * lanes),
-        np.empty(m * lanes),
-        np.empty(m * n * lanes),
         np.empty((n * n + 2 * n) * lanes),
         mean,
         P,

@@ -35,7 +35,7 @@ def absorb_lanes(d, P, width, R, at, correlated, nu, H):
         nis = nis + e * e * inverse
         d = d + e * K
         B = P - outer(Ph, K)
-        P = B + outer(K, r * K - h @ B)
+        P = mirrored(B + outer(K, r * K - h @ B))
     return d, P, nis
 
 
@@ -67,9 +67,6 @@ def filter_lanes(
     truth: Array,
     member: Indices,
     groups: int,
-    row_z: Array,
-    nu: Array,
-    H: Array,
     work: Array,
     mean: Array,
     covariance: Array,
@@ -79,6 +76,7 @@ def filter_lanes(
     nis: Array,
     lowest: Array,
 ) -> None:
+    row_z, nu, H = scratch(M_LANES), scratch(M_LANES), scratch(MN_LANES)
     ones = load_lanes(one, 0, 1, 0, LANES)[0]
     Q_unit = load_matrix(Q, 0, N, N)
     for group in range((runs + LANES - 1) // LANES):
@@ -90,7 +88,7 @@ def filter_lanes(
         for k in range(K):
             if t[k] > before:
                 x, Phi = transition_lanes(before, t[k] - before, count[k], x, p)
-                P = Phi @ P @ Phi.T + scale[k] * Q_unit
+                P = mirrored(Phi @ P @ Phi.T + scale[k] * Q_unit)
             before = t[k]
             if at_truth:
                 x = load_lanes(truth, (run * K + k) * N, N, K * N, LANES)
@@ -110,7 +108,6 @@ def filter_lanes(
                     d, P, _ = absorb_lanes(d, P, width[s], R, s * M * M, correlated[s], nu, H)
                 if scored:
                     store_lanes(nis, run * J + row, J, vector(surprise))
-            P = symmetric(P)
             if at_truth == 0:
                 x = x + d
             if scored:

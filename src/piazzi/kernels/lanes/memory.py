@@ -98,6 +98,18 @@ def plus_outer(typing: Any, A: Any, u: Any, v: Any) -> Any:
     return result(A, u, v), lower
 
 
+@intrinsic
+def mirrored(typing: Any, A: Any) -> Any:
+    """The symmetric matrix whose upper triangle is that of A: nothing below it is ever computed."""
+
+    def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
+        rows = [parts(b, row) for row in parts(b, args[0])]
+        whole = [[rows[min(i, j)][max(i, j)] for j in range(A.n)] for i in range(A.r)]
+        return join(b, A, [join(b, A.row, row) for row in whole])
+
+    return (A(A), lower) if A.r == A.n else None
+
+
 @intrinsic(prefer_literal=True)
 def unit(typing: Any, i: Any, n: Any) -> Any:
     """Row `i` of the identity of size `n` (all zero where `i` is negative)."""
