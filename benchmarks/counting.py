@@ -95,6 +95,7 @@ def _vocabulary() -> dict[str, Any]:
         "matrix": lambda *rows: _kept(rows),
         "unit": lambda i, n: _objects(plain.unit(i, n)),
         "identity": lambda n: _objects(np.eye(n)),
+        "scratch": lambda n: _objects(plain.scratch(n)),
         "wrap_angle": lambda a: Number(plain.wrap_angle(float(a))),
         "unless_missing": lambda z, nu: math.inf if math.isnan(float(nu)) and not math.isnan(float(z)) else nu,
     }
@@ -118,6 +119,9 @@ class _Entry:
         for i in floats:
             if args[i].flags.writeable:
                 args[i][...] = np.array([float(v) for v in inside[i]]).reshape(args[i].shape)
+
+    def after(self, first: Any, *args: Any) -> None:
+        self(*first.arguments, *args)
 
     def bind(self, *args: Any) -> Callable[[], None]:
         return lambda: self(*args)
