@@ -36,7 +36,7 @@ def test_addresses_stay_in_their_process():
     inputs = prepare(problem, tracking)
     inputs.run_of(problem)
     for thing in (tracking, inputs, problem):
-        assert {"_prepared", "_run", "_specs"}.isdisjoint(vars(pickle.loads(pickle.dumps(thing))))
+        assert {"_prepared", "_run", "specs"}.isdisjoint(vars(pickle.loads(pickle.dumps(thing))))
     again = pickle.loads(pickle.dumps((problem, tracking)))
     estimator = pz.ExtendedKalmanFilter()
     assert_array_equal(estimator.estimate(*again).mean, estimator.estimate(problem, tracking).mean)

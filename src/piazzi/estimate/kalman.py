@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite
 from typing import Any, Literal, get_args
 
@@ -68,7 +69,7 @@ class ExtendedKalmanFilter:
             raise ValueError(f"iterations is {self.iterations}; it must be a whole number from 1 to 1000")
         check_gate(self.gate)
 
-    @property
+    @cached_property
     def guard(self) -> Guard | None:
         """What goes beyond the plain filter, None where nothing does."""
         return None if self.iterations == 1 and self.gate is None else Guard(int(self.iterations), self.gate)
@@ -103,7 +104,12 @@ class ExtendedKalmanFilter:
 
 def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tuple[Array, Array, Array, Array, float]:
     """Means (K, n), covariances (K, n, n), innovations (J, m), their covariances (J, m, m), and the seconds it took."""
-    library = kernels.load(problem.spec("transition", problem.noise_fragment, *update_fragments(problem, update), "filter"))
+    kind = update, problem.noise_fragment, problem.is_correlated
+    spec = problem.specs.get(kind)
+    if spec is None:
+        fragments = ("transition", problem.noise_fragment, *update_fragments(problem, update), "filter")
+        spec = problem.specs[kind] = problem.spec(*fragments)
+    library = kernels.load(spec)
     K, n, (J, m) = len(inputs.t), len(problem.mean), inputs.z.shape
     mean, P, nu, S = np.empty((K, n)), np.empty((K, n, n)), np.empty((J, m)), np.empty((J, m, m))
     started = time.perf_counter()

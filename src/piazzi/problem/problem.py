@@ -21,7 +21,7 @@ from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Tru
 from piazzi.problem.two_body import check_orbit_axes, check_two_body
 
 MOST_KINDS = 100  # beyond so many kinds of problem, the memory of their specifications starts anew
-_SPECS: dict[tuple[Any, ...], dict[tuple[tuple[str, ...], int], KernelSpec]] = {}
+_SPECS: dict[tuple[Any, ...], dict[tuple[Any, ...], KernelSpec]] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class Problem:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the specifications of kernels, which this process shares among problems."""
-        return {name: value for name, value in self.__dict__.items() if name != "_specs"}
+        return {name: value for name, value in self.__dict__.items() if name != "specs"}
 
     # ---- checks --------------------------------------------------------------------------------------------------
 
@@ -171,7 +171,7 @@ class Problem:
 
     def _lay_out(self) -> None:
         """Make the arrays now, so that no run has to."""
-        for name in ("mean", "covariance", "given", "narrowest", "considered", "is_correlated", "noise_fragment", "_specs"):
+        for name in ("mean", "covariance", "given", "narrowest", "considered", "is_correlated", "noise_fragment", "specs"):
             getattr(self, name)
         for name in ("sensor", "noise", "correlated", "numbers"):
             getattr(self, f"station_{name}")
@@ -257,14 +257,17 @@ class Problem:
         """The compiled module with these fragments, for this model, integrator, kind of noise, and manoeuvres or none."""
         assert self.integrator is not None
         key = (fragments, lanes)
-        spec = self._specs.get(key)
+        spec = self.specs.get(key)
         if spec is None:
-            spec = self._specs[key] = KernelSpec(self.model, self.integrator.scheme, composed(self, fragments, lanes), lanes)
+            spec = self.specs[key] = KernelSpec(self.model, self.integrator.scheme, composed(self, fragments, lanes), lanes)
         return spec
 
     @cached_property
-    def _specs(self) -> dict[tuple[tuple[str, ...], int], KernelSpec]:
-        """Specifications of kernels so far, shared with all problems for which the choice of fragments comes out the same."""
+    def specs(self) -> dict[tuple[Any, ...], KernelSpec]:
+        """Specifications of kernels so far, shared with all problems for which the choice of fragments comes out the same.
+
+        By fragments and lanes, and by what else a reader that is in a hurry finds its own again.
+        """
         integrator, events = self.integrator, bool(self.manoeuvres)
         assert integrator is not None
         traits = self.model, type(integrator), integrator.scheme, events, self.process_noise.axes, self.noise_varies

@@ -57,6 +57,7 @@ class Tracking:
                 raise ValueError(f"row_stations has {len(names)} names for {len(self.row_times)} rows")
             names.setflags(write=False)
             put(self, "row_stations", names)
+        _ = self.times  # made now, with the rows of each epoch, so that no estimator has to
         if self.truth is not None:
             put(self, "truth", self._checked_truth())
 
