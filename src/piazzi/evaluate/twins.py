@@ -19,6 +19,7 @@ _DRAWS, _SEED = 24, 1801
 _ITERATIONS = 40
 _SEARCHED = 2000  # epochs of the search; what it finds is then fitted to all
 _WORK = 1_000_000  # epochs that such a fit may pass in all
+_FEWEST = 4  # times that it may pass all of them, however many there are
 _AXES = 3  # of a space whose reflections and rotations are tried
 
 
@@ -58,8 +59,8 @@ def find_twins(problem: Problem, inputs: Inputs, first: Array, unit: Array, root
         if misfit <= LISTED and all(_differ(state, other, unit, root) for other in (first, *found)):
             found.append(state)
     if begun is not whole:
-        few = max(2, min(_ITERATIONS, _WORK // whole.epochs))
-        found = [fit(problem, whole, state, unit, few)[0] for state in found]
+        few = max(_FEWEST, _WORK // whole.epochs)
+        found = [fit(problem, whole, state, unit, _ITERATIONS, few)[0] for state in found]
     twins = [Twin(s, _misfit(problem, whole, s), _prior_distance(problem, s)) for s in found]
     twins.sort(key=lambda twin: (round(twin.misfit, 6), twin.state.tolist()))
     kept: list[Twin] = []
@@ -69,8 +70,13 @@ def find_twins(problem: Problem, inputs: Inputs, first: Array, unit: Array, root
     return tuple(kept)
 
 
-def fit(problem: Problem, inputs: Inputs, start: Array, unit: Array, iterations: int) -> tuple[Array, float]:
-    """The first state (n,) near `start` that fits best, and its misfit, infinite where none has a finite one."""
+def fit(
+    problem: Problem, inputs: Inputs, start: Array, unit: Array, iterations: int, passes: float = np.inf
+) -> tuple[Array, float]:
+    """The first state (n,) near `start` that fits best, and its misfit, infinite where none has a finite one.
+
+    It takes so many iterations at most, and passes over the measurements.
+    """
     x, damping = np.array(start, dtype=float), 1e-3
     with np.errstate(all="ignore"):
         shot = from_first(problem, inputs, x)
@@ -84,7 +90,8 @@ def fit(problem: Problem, inputs: Inputs, start: Array, unit: Array, iterations:
             J, rest = T[:, :-1], T[:, -1]
             scale = np.linalg.norm(J, axis=0)
             ridge = np.diag(np.where(scale > 0, scale, 1.0))
-            while damping < 1e9:
+            while damping < 1e9 and passes > 1:
+                passes -= 1
                 step = np.linalg.lstsq(np.vstack([J, np.sqrt(damping) * ridge]), np.append(rest, 0.0 * scale), rcond=None)[0]
                 trial = from_first(problem, inputs, x + unit * step)
                 r_new, cost_new = _residuals(trial.innovations)
