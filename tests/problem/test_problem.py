@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
+from piazzi.problem.problem import MOST_KINDS
 from tests.laws.problems import b612, random_covariance, satellite
 
 NAN, INF = np.nan, np.inf
@@ -292,3 +293,18 @@ def test_no_substep_is_longer_than_asked(intervals, step):
 
 def test_whole_number_of_steps_stays_whole():
     assert_array_equal(pz.Taylor(max_step=0.1).counts(np.arange(1, 50) * 0.1), np.arange(1, 50))
+
+
+def test_kernels_that_are_loaded_stay_loaded_however_many_kinds_of_problems_come(monkeypatch):
+    """Kinds for which no kernel was wanted are forgotten."""
+    monkeypatch.setattr("piazzi.problem.problem._SPECS", kinds := {})
+
+    def kind(i):
+        model = pz.Model(["x"], [f"-{i}*x"], [pz.Sensor("position", ["x"])])
+        return pz.Problem(model, pz.Gaussian(1.0, 1.0), stations=pz.Station("here", "position", 1.0))
+
+    wanted = [kind(i).spec("transition", "rates") for i in range(1, 4)]
+    for i in range(4, 4 + 2 * MOST_KINDS):
+        kind(i)
+    assert [kind(i).spec("transition", "rates") for i in range(1, 4)] == wanted
+    assert len(kinds) <= MOST_KINDS + 1

@@ -20,7 +20,7 @@ from piazzi.problem.constants import with_station_constants
 from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
 from piazzi.problem.two_body import check_orbit_axes, check_two_body
 
-MOST_KINDS = 100  # beyond so many kinds of problem, the memory of their specifications starts anew
+MOST_KINDS = 100  # beyond so many kinds of problem, those are forgotten for which no kernel was wanted
 _SPECS: dict[tuple[Any, ...], dict[tuple[Any, ...], KernelSpec]] = {}
 
 
@@ -271,8 +271,9 @@ class Problem:
         integrator, events = self.integrator, bool(self.manoeuvres)
         assert integrator is not None
         traits = self.model, type(integrator), integrator.scheme, events, self.process_noise.axes, self.noise_varies
-        if len(_SPECS) > MOST_KINDS:
-            _SPECS.clear()
+        if len(_SPECS) > MOST_KINDS:  # the others stay: what is loaded is found by them, and stays too
+            for kind in [kind for kind, specs in list(_SPECS.items()) if not specs]:
+                _SPECS.pop(kind, None)
         return _SPECS.setdefault(traits, {})
 
     @cached_property
