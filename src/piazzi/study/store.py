@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +16,7 @@ from piazzi.io import hdf5
 from piazzi.io.atomic import atomic_path
 from piazzi.problem.checks import Array
 from piazzi.study.log import Log
+from piazzi.study.pieces import Piece, Task
 from piazzi.study.plan import SCHEMA, Study
 from piazzi.study.score import NUMBERS
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from piazzi.study.summary import Summary
 
 _RUNS_TOGETHER = 256
+_WRITTEN_TOGETHER = 1 << 25  # bytes
 _NOT_COMPARED = ("seconds",)
 MOST_MESSAGES = 10_000  # that are kept: which runs failed is known of all
 
@@ -102,7 +104,7 @@ def write_store(path: str | os.PathLike[str], study: Study, log: Log) -> None:
     lost = 0
     with atomic_path(path) as work, h5netcdf.File(work, "w") as file:
         _create(file, study)
-        for piece in log.pieces():
+        for piece in _together(log.pieces()):
             task = piece.task
             if not task.count:
                 for name, values in piece.arrays.items():
@@ -114,6 +116,34 @@ def write_store(path: str | os.PathLike[str], study: Study, log: Log) -> None:
             messages += [[task.point, row, run, text] for row, run, text in piece.messages[:room]]
             lost += max(0, len(piece.messages) - room)
         _write_text(file, "about", {**_about(study), "messages": sorted(messages), "messages_left_out": lost})
+
+
+def _together(pieces: Iterable[Piece]) -> Iterator[Piece]:
+    """The pieces, those of neighbouring runs as one up to a size: a variable is written as fast for hundreds as for one."""
+    waiting: list[Piece] = []
+    for piece in pieces:
+        if waiting and not _goes_with(piece, waiting):
+            yield _joined(waiting)
+            waiting = []
+        waiting.append(piece)
+    if waiting:
+        yield _joined(waiting)
+
+
+def _goes_with(piece: Piece, before: Sequence[Piece]) -> bool:
+    last, size = before[-1].task, sum(a.nbytes for p in (*before, piece) for a in p.arrays.values())
+    next_to = (piece.task.point, piece.task.first) == (last.point, last.first + last.count)
+    return next_to and piece.task.count > 0 and last.count > 0 and size <= _WRITTEN_TOGETHER
+
+
+def _joined(pieces: Sequence[Piece]) -> Piece:
+    """One piece of runs that follow each other; their axis is the second."""
+    if len(pieces) == 1:
+        return pieces[0]
+    first = pieces[0].task
+    task = Task(first.point, first.first, sum(p.task.count for p in pieces))
+    arrays = {name: np.concatenate([p.arrays[name] for p in pieces], axis=1) for name in pieces[0].arrays}
+    return Piece(task, arrays, tuple(m for p in pieces for m in p.messages))
 
 
 def read_store(path: str | os.PathLike[str]) -> Stored:
