@@ -61,8 +61,6 @@ linearize_dynamics: Any
 noise_at: Any
 noise_varies: Any
 linearize_rows: Any
-chain_cost: Any
-
 marginal_covariances: Any
 forward: Any
 record_epoch: Any
@@ -73,9 +71,6 @@ Q_matrix: Any
 back_through_epoch: Any
 backward: Any
 absorb_epoch: Any
-update_scalar: Any
-factor_noise: Any
-judge: Any
 surprise: Any
 update_epoch_guarded: Any
 # written in fragments/*_lanes.py
