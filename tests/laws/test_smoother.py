@@ -1,5 +1,6 @@
 """The smoother: on linear problems Rauch, Tung and Striebel's, least squares and the graph; else along the filter's path."""
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -178,3 +179,25 @@ def test_a_start_without_a_derivative_is_told_as_the_filter_tells_it():
         for estimator in (pz.ExtendedKalmanFilter(), pz.Smoother()):
             with pytest.raises(ValueError, match="station 'well' has no derivative at the prior mean"):
                 estimator.estimate(problem, pz.Tracking([0.0, 1.0], [1.0, 2.0]))
+
+
+@pytest.mark.parametrize("ratio", [1e2, 1e4])
+@pytest.mark.parametrize("estimator", [pz.Smoother(), pz.FactorGraph(solver="chain"), pz.SlidingWindow(9)], ids=str)
+def test_a_rough_measurement_counts_beside_precise_later_ones(estimator, ratio, monkeypatch):
+    """A state at rest, seen roughly along one direction and then precisely along another: informations add up."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    rows = {"rough": ([0.6, 0.8], 0.1**2), "precise": ([0.8, 0.6], (0.1 / ratio) ** 2)}
+    sensors = [pz.Sensor(name, [f"{a}*x + {b}*y"]) for name, ((a, b), _) in rows.items()]
+    stations = [pz.Station(name, name, R) for name, (_, R) in rows.items()]
+    model = pz.Model(("x", "y"), ("x", "y"), sensors, discrete=True)
+    problem = pz.Problem(model, pz.Gaussian([0.0, 0.0], np.eye(2)), None, stations)
+    seen = ["rough", "precise", "precise"]
+    estimate = estimator.estimate(problem, pz.Tracking(np.arange(3.0), np.zeros(3), seen))
+    with mpmath.workdps(60):
+        information = mpmath.eye(2)
+        for h, R in map(rows.get, seen):
+            information += mpmath.matrix(h) * mpmath.matrix(h).T / mpmath.mpf(R)
+        b = mpmath.matrix(rows["rough"][0])
+        expected = float((b.T * information**-1 * b)[0])
+    first = (estimate.delayed or estimate).covariance[0]
+    assert_allclose(np.array([0.6, 0.8]) @ first @ [0.6, 0.8], expected, rtol=1e-12)

@@ -52,15 +52,15 @@ def forget(Y, T, noise, amount, keep_cross):
 
 
 @inline
-def inform(at, predicted, stride, P_pred, covariance, rows):
+def inform(at, stride, own, covariance, rows):
     """Covariances of `LANES` states, at `at`, `at + stride`, ..., in the place of their information, in Joseph form.
 
-    Each predicted covariance (the first is at `predicted`) takes the information in as measurements of unit noise: the rows
-    of `directions`, one after the other as they become known.
+    Each covariance given all measurements so far, in `own`, takes the information of later ones in as measurements of unit
+    noise: the rows of `directions`, one after the other as they become known.
     """
     for i in range(N):
         store_packs(rows, i * N * LANES, load_lanes(covariance, at + i * N, N, stride, LANES), LANES)
-    P = load_matrices(P_pred, predicted, N, N, stride, LANES)
+    P = load_matrices(own, 0, N, N, stride, LANES)
     for j in range(N):
         whole = load_packs(rows, (j * N + j) * LANES, 1, LANES)[0]
         row = load_packs(rows, j * N * LANES, N, LANES)
@@ -81,17 +81,18 @@ def inform(at, predicted, stride, P_pred, covariance, rows):
 def marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P_last, keep_cross, covariance, cross):
     """Covariance of each state a ... a + W - 1 into its place; of state k with state k + 1 into `cross` where wanted.
 
-    Information is carried back from state to state, and kept where the covariance will be; what it does to the predicted
-    covariance of each state depends on no other state, so `LANES` of them are worked on together.
+    Information is carried back from state to state, and kept where the covariance will be; what it does to the covariance of
+    each state depends on no other state, so `LANES` of them are worked on together.  A state's own measurements are no part
+    of it: a rough one beside precise ones of later states would be lost in the sum.
     """
     base = first_row[a]
-    rows, g = scratch(NN_LANES), scratch(NN)
-    last = (first_row[a + W - 1] - base) * M
-    Y = information_before(last, (first_row[a + W] - base) * M, nu, H, 0.0 * P_last)
+    rows, own, g = scratch(NN_LANES), scratch(NN_LANES), scratch(NN)
+    Y = 0.0 * P_last
     directions(Q, g)
     for b in range(1, W):
         j = W - 1 - b
         k = a + j
+        Y = information_before((first_row[k + 1] - base) * M, (first_row[k + 2] - base) * M, nu, H, Y)
         amount = scale[k + 1]
         if noise_varies():
             directions(noise_at(j + 1, amount, Q, Q_all), g)
@@ -99,14 +100,18 @@ def marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P
         Y, T = forget(Y, identity(N), g, amount, keep_cross)
         F = load_matrix(Phi, j * N * N, N, N)
         Y = symmetric(F.T @ Y @ F)
-        Y = information_before((first_row[k] - base) * M, (first_row[k + 1] - base) * M, nu, H, Y)
         store(covariance, k * N * N, Y)
         if keep_cross:
             store(cross, k * N * N, T @ F)
     j = 0
     while j < W - 1:
         together = LANES if j + LANES < W else 1
-        inform((a + j) * N * N, j * N * N, N * N if together > 1 else 0, P_pred, covariance, rows)
+        for lane in range(together):
+            first, last = first_row[a + j + lane], first_row[a + j + lane + 1]
+            P = load_matrix(P_pred, (j + lane) * N * N, N, N)
+            _, P, _ = absorb_epoch((first - base) * M, (last - base) * M, unit(-1, N), P, nu, H)
+            store(own, lane * N * N, P)
+        inform((a + j) * N * N, N * N if together > 1 else 0, own, covariance, rows)
         j += together
     store(covariance, (a + W - 1) * N * N, symmetric(P_last))
     if keep_cross:
