@@ -75,7 +75,7 @@ class Chain:
         J = len(inputs.z)
         self.x, self.f, self.Phi = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N))
         self.Q_all = np.empty((K if problem.noise_varies else 1, N, N))
-        self.nu, self.H = np.empty((J, M)), np.empty((J, M, N))
+        self.nu, self.H = np.empty((J, M)), np.zeros((J, M, N))  # no row of H is made for what a sensor does not have
         self.d_pred, self.P_pred = np.empty((K, N)), np.empty((K, N, N))
         self.multiplier, self.dx = np.zeros((K, N)), np.empty((K, N))
         self.broken, self.report = np.zeros((K, N)), np.zeros(9)
