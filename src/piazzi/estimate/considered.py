@@ -19,11 +19,6 @@ _Estimator = TypeVar("_Estimator")
 Run = Callable[[_Estimator, Problem, Tracking], Estimate]
 
 
-def considered_names(problem: Problem) -> tuple[str, ...]:
-    """Names of the parameters that are considered and uncertain."""
-    return problem.considered
-
-
 def with_considered(run: Run[_Estimator]) -> Run[_Estimator]:
     """An estimator's `estimate` that accounts for considered parameters.
 
@@ -79,7 +74,7 @@ def _inflated(nominal: Estimate, name: str, above: Estimate, below: Estimate) ->
 
 def has_considered(estimate: Estimate) -> bool:
     """Whether the estimate tells what each considered parameter does to it: one that failed does not."""
-    return all(f"considered_{name}" in estimate.details for name in considered_names(estimate.problem))
+    return all(f"considered_{name}" in estimate.details for name in estimate.problem.considered)
 
 
 def nominal(estimator: Any, problem: Problem, tracking: Tracking) -> Estimate:

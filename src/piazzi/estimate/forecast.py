@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.considered import STEP, considered_names, has_considered, moved
+from piazzi.estimate.considered import STEP, has_considered, moved
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, numeric
 
@@ -67,10 +67,9 @@ def forecast(estimate: Estimate, times: Any) -> Forecast:
     if not (np.isfinite(last).all() and np.isfinite(P_last).all()):
         raise ValueError(f"nothing can be carried forward: {estimate.message}")
     way = (at, start, *_parts(estimate, at))
-    names = considered_names(estimate.problem)
     if not has_considered(estimate):
         raise ValueError(f"nothing can be carried forward: {estimate.message}")
-    considered = {name: estimate.details[f"considered_{name}"][-1] for name in names}
+    considered = {name: estimate.details[f"considered_{name}"][-1] for name in estimate.problem.considered}
     own = P_last - sum((np.outer(s, s) for s in considered.values()), np.zeros_like(P_last))
     mean, P = _carried(estimate.problem, way, last, own)
     for name, s in considered.items():

@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.considered import considered_names
 from piazzi.estimate.saved import Saved
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -19,7 +18,7 @@ class Clock:
     """Where a session stands between epochs: checks that time goes forward, and the length of each step."""
 
     def __init__(self, problem: Problem) -> None:
-        for name in considered_names(problem):
+        for name in problem.considered:
             raise ValueError(
                 f"parameter {name!r} is considered, which needs the whole run: make it fixed or estimated to go measurement by "
                 "measurement"

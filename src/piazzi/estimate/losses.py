@@ -7,6 +7,7 @@ Statistics, 2nd ed. 2009, ch. 7; Barfoot, State Estimation for Robotics, 2017, s
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -18,7 +19,7 @@ from piazzi.problem.checks import Array
 
 
 @dataclass(frozen=True)
-class Loss:
+class Loss(ABC):
     """A loss with its tuning constant `k`, in standard deviations of a row with one component.
 
     The defaults keep 95 % efficiency on Gaussian noise (Holland and Welsch, Communications in Statistics A6, 1977).  The
@@ -44,13 +45,13 @@ class Loss:
         more = [quantile(passed, m) if passed < 1.0 - 1e-15 else one + m - 1 for m in range(2, width + 1)]
         return np.array([one, one, *more][: width + 1])
 
+    @abstractmethod
     def cost(self, s: Array, square: Array) -> Array:
         """rho(s) for squared residuals `s` where the constant has this `square`, same shape."""
-        raise NotImplementedError
 
+    @abstractmethod
     def weight(self, s: Array, square: Array) -> Array:
         """rho'(s), in [0, 1], same shape."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

@@ -64,16 +64,6 @@ def widen(b: Any, have: Any, want: Any, v: Any) -> Any:
     return join(b, want, [widen(b, kind, inner, part) for part in parts(b, v)])
 
 
-def add(b: Any, x: Any, y: Any) -> Any:
-    """x + y, entry by entry."""
-    return zipped(b, lambda u, v: b.fadd(u, v, flags=FUSE), x, y)
-
-
-def sub(b: Any, x: Any, y: Any) -> Any:
-    """x - y, entry by entry."""
-    return zipped(b, lambda u, v: b.fsub(u, v, flags=FUSE), x, y)
-
-
 def scale(b: Any, s: Any, x: Any) -> Any:
     """The element `s` times everything in `x`."""
 

@@ -201,18 +201,23 @@ def _lane_positions(b: Any, at: Any, stride: Any, w: int, offset: int) -> list[A
     return [b.add(first, b.mul(stride, ir.Constant(at.type, lane))) for lane in range(w)]
 
 
+def _load_row(b: Any, a: Any, at: Any, stride: Any, row: Vector) -> Any:
+    """A vector whose lanes are at `at`, `at + stride`, ..."""
+    if row.w == 1:
+        value = b.load(_pointer(b, a, at, llvm_type(row)))
+        value.align = 8
+        return value
+    places = [_lane_positions(b, at, stride, row.w, i) for i in range(row.n)]
+    return join(b, row, [join(b, element(row.w), [b.load(b.gep(a, [place])) for place in lanes]) for lanes in places])
+
+
 @intrinsic(prefer_literal=True)
 def load_lanes(typing: Any, a: Any, at: Any, n: Any, stride: Any, w: Any) -> Any:
     """The vectors of `n` numbers at `at`, `at + stride`, ..., one to a lane."""
     result = Vector(n.literal_value, w.literal_value)
 
     def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
-        packs = []
-        for i in range(result.n):
-            places = _lane_positions(b, args[1], args[3], result.w, i)
-            values = [b.load(b.gep(args[0], [place])) for place in places]
-            packs.append(join(b, element(result.w), values) if result.w > 1 else values[0])
-        return join(b, result, packs)
+        return _load_row(b, args[0], args[1], args[3], result)
 
     return result(a, types.intp, n, types.intp, w), lower
 
@@ -223,17 +228,8 @@ def load_matrices(typing: Any, a: Any, at: Any, r: Any, n: Any, stride: Any, w: 
     result = Matrix(r.literal_value, n.literal_value, w.literal_value)
 
     def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
-        rows = []
-        for i in range(result.r):
-            start = b.add(args[1], ir.Constant(args[1].type, i * result.n))
-            if result.w == 1:
-                rows.append(b.load(_pointer(b, args[0], start, llvm_type(result.row))))
-                rows[-1].align = 8
-                continue
-            places = [_lane_positions(b, start, args[4], result.w, j) for j in range(result.n)]
-            packs = [join(b, element(result.w), [b.load(b.gep(args[0], [one])) for one in entry]) for entry in places]
-            rows.append(join(b, result.row, packs))
-        return join(b, result, rows)
+        starts = [b.add(args[1], ir.Constant(args[1].type, i * result.n)) for i in range(result.r)]
+        return join(b, result, [_load_row(b, args[0], start, args[4], result.row) for start in starts])
 
     return result(a, types.intp, r, n, types.intp, w), lower
 
