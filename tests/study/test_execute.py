@@ -2,18 +2,21 @@
 
 import os
 import re
-import signal
 import subprocess
 import sys
+import threading
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from piazzi.study import execute, read_store, run_study, same_results, versions
+from piazzi.present.studies import failures
+from piazzi.study import execute, pieces, pool, read_store, run_study, same_results, versions
 from piazzi.study.pieces import Task, simulated
 from piazzi.study.pool import Processes
+from piazzi.study.runner import RETRIES
 from tests.study.estimators import Poison
 from tests.study.studies import small
 
@@ -150,25 +153,44 @@ def test_a_study_that_workers_cannot_read_ends_at_once(tmp_path):
 
 @pytest.mark.slow
 def test_a_worker_killed_from_outside_takes_nothing_along(whole, tmp_path, monkeypatch):
+    """Five times, at moments from the start of a task to after its end; none is hit so often that it counts as the cause."""
     study, expected = whole
-    teams, killed = [], []
-    original = Processes.__init__
+    deaths, moments, lock = Counter(), [0.0, 0.05, 0.2, 0.5, 1.0], threading.Lock()
+    original = Processes._run
 
-    def remember(self, *args):
-        original(self, *args)
-        teams.append(self)
+    def run_and_kill(self, process, task):
+        with lock:
+            moment = moments.pop() if moments and deaths[task] < RETRIES else None
+            deaths[task] += moment is not None
+        if moment is None:
+            return original(self, process, task)
+        timer = threading.Timer(moment, process.kill)
+        timer.start()
+        outcome = original(self, process, task)
+        timer.join()
+        process.wait()
+        return outcome
 
-    def kill(finished, total):
-        pids = teams[0].pids() if teams else []
-        if pids and len(killed) < 5:
-            os.kill(pids[len(killed) % len(pids)], signal.SIGKILL)
-            killed.append(finished)
-
-    monkeypatch.setattr(Processes, "__init__", remember)
-    stored = run_study(study, tmp_path / "s.nc", workers=2, chunk=6, progress=kill)
-    assert len(killed) == 5
-    assert stored.about["messages"] == []
+    monkeypatch.setattr(Processes, "_run", run_and_kill)
+    stored = run_study(study, tmp_path / "s.nc", workers=2, chunk=6)
+    assert deaths.total() == 5
+    assert (stored.about["messages"], stored.about["bounds_unknown"]) == ([], [])
     assert same_results(expected, tmp_path / "s.nc") == []
+
+
+def test_a_bound_that_cannot_be_computed_is_told(tmp_path, monkeypatch):
+    def refuse(study, task):
+        if (task.point, task.count) == (1, 0):
+            raise ArithmeticError("no bound today")
+        return pieces.run_task(study, task)
+
+    monkeypatch.setattr(pool, "run_task", refuse)
+    stored = run_study(small(vary={"R.scale": [1, 4]}), tmp_path / "s.nc", workers=0)
+    message = "ArithmeticError: no bound today, 3 times"
+    assert stored.summary.to_dict()["bounds_unknown"] == [{"point": 1, "message": message}]
+    assert failures(stored.summary) == [f"Cramer-Rao bound (R.scale = 4): {message}"]
+    assert [line.over_bound["position"] is None for line in stored.summary.lines[:: len(stored.rows)]] == [False, True]
+    assert np.isfinite(stored.row(1, 0).error).all()
 
 
 def test_runs_of_other_versions_are_not_gone_on_with(tmp_path, monkeypatch):

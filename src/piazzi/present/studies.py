@@ -127,11 +127,18 @@ def heading(stored: Stored) -> str:
 
 
 def failures(summary: Summary, most: int = 5) -> list[str]:
-    """The first runs that failed, and why."""
-    found = summary.to_dict()["messages"]
-    out = [printable(f"run {m['run']}, {m['estimator']} ({_VIEW[m['view']]}): {m['message']}") for m in found[:most]]
+    """The first runs that failed and bounds that are not known, and why."""
+    document = summary.to_dict()
+    found, unknown = document["messages"][:most], document["bounds_unknown"][:most]
+    out = [printable(f"run {m['run']}, {m['estimator']} ({_VIEW[m['view']]}): {m['message']}") for m in found]
     total = sum(line.failed for line in summary.lines)
-    return [*out, f"... and {total - most:,} more"] if total > most else out
+    if total > most:
+        out.append(f"... and {total - most:,} more")
+    stored = summary.stored
+    for m in unknown:
+        point = point_name(dict(zip(stored.about["axes"], stored.points[m["point"]], strict=True)))
+        out.append(printable(f"Cramer-Rao bound{f' ({point})' if point else ''}: {m['message']}"))
+    return out
 
 
 def _rate(line: Line) -> str:

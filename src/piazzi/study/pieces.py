@@ -41,7 +41,10 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Results of a task: arrays by name, row by row of the study; and for each row and run without success, why."""
+    """Results of a task: arrays by name, row by row of the study; and for each row and run without success, why.
+
+    A bound that is not known has one message, of no row and no run: -1 stands for both.
+    """
 
     task: Task
     arrays: Mapping[str, Array]
@@ -81,9 +84,9 @@ def run_task(study: Study, task: Task) -> Piece:
 
 
 def lost(study: Study, task: Task, message: str) -> Piece:
-    """A piece without results, each of whose runs failed with this message; for a bound, one that is not known."""
+    """A piece without results, each of whose runs failed with this message; for a bound, one that is not known, and why."""
     if not task.count:
-        return Piece(task, no_bound(study))
+        return Piece(task, no_bound(study), ((-1, -1, message),))
     found = [(nothing(task.count, len(study.groups), len(study.kept)), [message] * task.count) for _ in study.rows]
     return _piece(task, found)
 

@@ -47,7 +47,8 @@ class Stored:
 
     Attributes
     ----------
-    about : everything that is not a number over runs: specification, digest, rows, groups, units, states, axes, messages
+    about : everything that is not a number over runs: specification, digest, rows, groups, units, states, axes, messages,
+        and why the bound of a point is not known
     times : (T,), epochs at which every run is kept, s
     """
 
@@ -101,6 +102,7 @@ def write_store(path: str | os.PathLike[str], study: Study, log: Log) -> None:
     import h5netcdf
 
     messages: list[list[Any]] = []
+    unknown: list[list[Any]] = []
     lost = 0
     with atomic_path(path) as work, h5netcdf.File(work, "w") as file:
         _create(file, study)
@@ -109,13 +111,15 @@ def write_store(path: str | os.PathLike[str], study: Study, log: Log) -> None:
             if not task.count:
                 for name, values in piece.arrays.items():
                     file.variables[name][task.point] = values
+                unknown += [[task.point, text] for *_, text in piece.messages]
                 continue
             for name, values in piece.arrays.items():
                 file.variables[name][task.point, :, task.first : task.first + task.count] = values
             room = MOST_MESSAGES - len(messages)
             messages += [[task.point, row, run, text] for row, run, text in piece.messages[:room]]
             lost += max(0, len(piece.messages) - room)
-        _write_text(file, "about", {**_about(study), "messages": sorted(messages), "messages_left_out": lost})
+        told = {"messages": sorted(messages), "messages_left_out": lost, "bounds_unknown": unknown}
+        _write_text(file, "about", {**_about(study), **told})
 
 
 def _together(pieces: Iterable[Piece]) -> Iterator[Piece]:

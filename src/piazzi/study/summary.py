@@ -173,6 +173,10 @@ class Summary:
                 for point, row, run, text in about["messages"][:MOST_SHOWN]
                 for stored_row in [self.stored.rows[row]]
             ],
+            "bounds_unknown": [
+                {"point": point, "message": text}
+                for point, text in about.get("bounds_unknown", [])  # not in earlier stores
+            ],
         }
 
 
