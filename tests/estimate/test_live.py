@@ -30,7 +30,7 @@ def test_the_filter_gives_the_whole_run_bit_for_bit(bearings, estimator):
     assert live.time == tracking.times[-1]
 
 
-@pytest.mark.parametrize(("lag", "iterations"), [(1, 1), (10, 1), (5, 3)])
+@pytest.mark.parametrize(("lag", "iterations"), [(1, 1), (10, 1), (5, 3), (100, 1)])
 def test_the_window_gives_the_whole_run_bit_for_bit(bearings, lag, iterations):
     problem, tracking = bearings
     estimator = pz.SlidingWindow(lag=lag, iterations=iterations)

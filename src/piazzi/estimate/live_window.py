@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from piazzi.estimate.live import Clock, checked_measurement
 from piazzi.estimate.losses import Loss
 from piazzi.estimate.robust_window import row_space, window_fragments
 from piazzi.estimate.saved import MOST_STEPS, Saved, check_order, check_steps
+from piazzi.estimate.stretch import Stretch
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
@@ -59,31 +60,33 @@ class LiveWindow:
         self.refused: list[tuple[float, str]] = []
         self._m, self._P = problem.mean.copy(), problem.covariance.copy()
         self._newest = problem.mean.copy(), problem.covariance.copy()
-        self._row = np.full(m, np.nan)
+        self._row, self._pending = np.full(m, np.nan), None
         self.innovation, self.innovation_covariance = np.full(m, np.nan), np.full((m, m), np.nan)
-        self._t, self._count, self._scale = np.empty(0), np.empty(0, dtype=np.int64), np.empty(0)
-        self._first_row, self._z, self._station = np.zeros(1, dtype=np.int64), np.empty((0, m)), np.empty(0, dtype=np.int64)
-        self._x, self._x_before, self._late_covariance = np.empty((0, n)), np.empty((0, n)), np.empty((0, n, n))
-        self._space: tuple[Array, ...] = ()
-        self._capacity = (0, 0)
+        self._window = Stretch(n, m)
+        self._span, self._unread = np.zeros(2, dtype=np.int64), np.zeros((2, n, n))
+        self._bind()
+
+    _pending: float | None
 
     @property
     def time(self) -> float | None:
-        return float(self._t[-1]) if len(self._t) else self.problem.prior_time
+        window = self._window
+        return float(window.t[window.stop - 1]) if len(window) else self.problem.prior_time
 
     @property
     def times(self) -> Array:
-        return self._t.copy()
+        return self._window.t[self._window.first : self._window.stop].copy()
 
     @property
     def means(self) -> Array:
-        return self._x.copy()
+        return self._window.x[self._window.first : self._window.stop].copy()
 
     @property
     def oldest(self) -> Gaussian:
-        if not len(self._t):
+        if not len(self._window):
             raise ValueError("there is no state in the window yet")
-        return Gaussian(self._x[0].copy(), self._late_covariance[0].copy())
+        first = self._window.first
+        return Gaussian(self._window.x[first].copy(), self._oldest_covariance[first].copy())
 
     # ---- measurements --------------------------------------------------------------------------------------------
 
@@ -95,21 +98,14 @@ class LiveWindow:
             raise ValueError(f"time {t:g} s is before {now:g} s, where the estimate stands")
         self.mean, self.covariance = (a.copy() for a in self._newest)
         self._pending = t
-        if dt > 0:
-            count, scale = self._clock.step(dt)
-            p, n = self.problem, self.problem.model.n
-            self._library.predict_once(
-                now,
-                dt,
-                count,
-                scale,
-                p.given,
-                p.process_noise.covariance,
-                self.mean,
-                self.covariance,
-                np.empty((n, n)),
-                np.empty((n, n)),
-            )
+        if now is not None and dt > 0:
+            self._carry(now, dt, self.mean, self.covariance)
+
+    def _carry(self, now: float, dt: float, mean: Array, covariance: Array) -> None:
+        """Predict a belief in place."""
+        p, (count, scale) = self.problem, self._clock.step(dt)
+        Q = p.process_noise.covariance
+        self._library.predict_once(now, dt, count, scale, p.given, Q, mean, covariance, *self._unread)
 
     def update(self, station: str, z: Any, t: float | None = None) -> bool:
         """Take in a measurement, at `t` or where the last prediction stands; whether it was inside the window.
@@ -123,187 +119,146 @@ class LiveWindow:
         t = self._pending if t is None else t
         if t is None or not np.isfinite(t):
             raise ValueError(f"time is {t}; it must be finite: give update a time, or call predict first")
-        if not len(self._t):
+        window = self._window
+        if not len(window):
             self._begin(t)
-        elif t > self._t[-1]:
+        elif t > window.t[window.stop - 1]:
             self._append(t)
-        elif t < self._t[0]:
+        elif t < window.t[window.first]:
             self.refused.append((t, station))
             return False
-        elif t == self._t[-1]:
-            self._x[:] = self._x_before
+        elif t == window.t[window.stop - 1]:
+            window.x[window.first : window.stop] = window.x_before[window.first : window.stop]
         else:
             self._insert(t)
-        self._add_row(int(np.searchsorted(self._t, t)), s)
-        nu, S = self._settle()
-        late = t < self._t[-1]  # the innovations that there are belong to the newest epoch
-        self.innovation = np.full_like(nu[-1], np.nan) if late else nu[-1].copy()
-        self.innovation_covariance = np.full_like(S[-1], np.nan) if late else S[-1].copy()
+        window.add_row(window.find(t), self._row, s)
+        self._settle(late=t < window.t[window.stop - 1])
         return True
-
-    _pending: float | None = None
 
     def _begin(self, t: float) -> None:
         """First epoch: the prior, carried there."""
-        dt = self._clock.interval(t)
+        dt, window = self._clock.interval(t), self._window
         if dt > 0:
-            n, p, (count, scale) = self.problem.model.n, self.problem, self._clock.step(dt)
-            self._library.predict_once(
-                t - dt,
-                dt,
-                count,
-                scale,
-                p.given,
-                p.process_noise.covariance,
-                self._m,
-                self._P,
-                np.empty((n, n)),
-                np.empty((n, n)),
-            )
-        self._t, self._count, self._scale = np.array([t]), np.ones(1, dtype=np.int64), np.zeros(1)
-        self._first_row = np.zeros(2, dtype=np.int64)
-        self._x = self._m[None].copy()
-        self._x_before, self._late_covariance = self._x.copy(), self._P[None].copy()
+            self._carry(t - dt, dt, self._m, self._P)
+        k = window.open_epoch(window.stop, t, 1, 0.0)
+        window.x[k] = window.x_before[k] = self._m
 
     def _append(self, t: float) -> None:
         """A new newest state, predicted; states beyond the lag leave."""
-        count, scale = self._clock.step(t - float(self._t[-1]))
-        self._t = np.append(self._t, t)
-        self._count, self._scale = np.append(self._count, count), np.append(self._scale, scale)
-        self._first_row = np.append(self._first_row, self._first_row[-1])
-        self._x = np.vstack([self._x, np.empty((1, self._x.shape[1]))])
-        self._library.live_append(len(self._t) - 1, self._t, self._count, self.problem.given, self._x)
-        leaving = self._leaving()
-        for a in range(leaving):
-            p = self.problem
-            self._library.live_retire(
-                a,
-                0,
-                self._t,
-                self._count,
-                self._scale,
-                self._first_row,
-                p.given,
-                p.process_noise.covariance,
-                self._x,
-                self._nu_lin,
-                self._H_lin,
-                self._dx,
-                self._m,
-                self._P,
-            )
-        self._drop(leaving)
-        self._x_before = self._x.copy()
+        window = self._window
+        self._predict_state(window.open_epoch(window.stop, t, *self._clock.step(t - float(window.t[window.stop - 1]))))
+        stays = self._stays()
+        if stays > window.first:
+            self._span[:] = window.first, stays
+            self._retire()
+            window.first = stays
+        window.x_before[stays : window.stop] = window.x[stays : window.stop]
 
-    def _leaving(self) -> int:
+    def _stays(self) -> int:
+        """The oldest epoch that stays in the window."""
+        window = self._window
         if self.lag_seconds is None:
-            return max(len(self._t) - self.lag, 0)
-        return int(np.searchsorted(self._t, window_opens(self._t[-1], self.lag_seconds)))
-
-    def _drop(self, count: int) -> None:
-        rows = int(self._first_row[count])
-        self._t, self._count, self._scale, self._x = (
-            self._t[count:].copy(),
-            self._count[count:],
-            self._scale[count:],
-            self._x[count:].copy(),
-        )
-        self._count, self._scale = self._count.copy(), self._scale.copy()
-        self._first_row = self._first_row[count:] - rows
-        self._z, self._station = self._z[rows:].copy(), self._station[rows:].copy()
+            return max(window.first, window.stop - self.lag)
+        return window.find(window_opens(window.t[window.stop - 1], self.lag_seconds))
 
     def _insert(self, t: float) -> None:
         """A late epoch between two others: its state is predicted from the one before."""
-        if t in self._t:
+        window = self._window
+        k = window.find(t)
+        if window.t[k] == t:
             return
-        k = int(np.searchsorted(self._t, t))
-        first, second = self._clock.step(t - float(self._t[k - 1])), self._clock.step(float(self._t[k]) - t)
-        self._t = np.insert(self._t, k, t)
-        self._count, self._scale = np.insert(self._count, k, first[0]), np.insert(self._scale, k, first[1])
-        self._count[k + 1], self._scale[k + 1] = second
-        self._first_row = np.insert(self._first_row, k, self._first_row[k])
-        self._x = np.insert(self._x, k, 0.0, axis=0)
-        self._library.live_append(k, self._t, self._count, self.problem.given, self._x)
-        self._x_before = np.insert(self._x_before, k, self._x[k], axis=0)
+        first, second = self._clock.step(t - float(window.t[k - 1])), self._clock.step(float(window.t[k]) - t)
+        k = window.open_epoch(k, t, *first)
+        window.count[k + 1], window.scale[k + 1] = second
+        self._predict_state(k)
+        window.x_before[k] = window.x[k]
 
-    def _add_row(self, k: int, s: int) -> None:
-        at = int(self._first_row[k + 1])
-        self._z = np.insert(self._z, at, self._row, axis=0)
-        self._station = np.insert(self._station, at, s)
-        self._first_row[k + 1 :] += 1
+    def _predict_state(self, k: int) -> None:
+        """The state of epoch `k` from the one before."""
+        self._rebind()
+        self._span[:] = k - 1, k
+        self._predict_once()
 
     # ---- the window ----------------------------------------------------------------------------------------------
 
-    def _settle(self) -> tuple[Array, Array]:
-        """Gauss-Newton steps over the window; innovations (J, m) with covariances, those of the newest epoch filled in."""
-        p, W, (J, M) = self.problem, len(self._t), self._z.shape
-        nu, S = np.empty((J, M)), np.empty((J, M, M))
-        space = self._buffers()
-        self._x = np.ascontiguousarray(self._x)
-        self._library.live_settle(
-            0,
-            W - 1,
+    def _settle(self, late: bool) -> None:
+        """Gauss-Newton steps over the window, and what came of them; innovations belong to the newest epoch."""
+        self._rebind()
+        window = self._window
+        self._span[:] = window.first, window.stop - 1
+        self._solve()
+        self.mean, self.covariance = window.x[window.stop - 1].copy(), self._newest_covariance.copy()
+        self._newest = self.mean.copy(), self.covariance.copy()
+        last = int(window.first_row[window.stop]) - 1
+        self.innovation, self.innovation_covariance = self._nu[last].copy(), self._S[last].copy()
+        if late:
+            self.innovation.fill(np.nan)
+            self.innovation_covariance.fill(np.nan)
+
+    def _rebind(self) -> None:
+        if self._window.room != self._room:
+            before = self._linear
+            self._bind()
+            for new, old in zip(self._linear, before, strict=True):  # the last linearisation is used as states leave
+                new[: len(old)] = old
+
+    def _bind(self) -> None:
+        """Work space for all that the window's buffers hold, and the kernels on both."""
+        p, w, n, m = self.problem, self._window, self.problem.model.n, self.problem.model.width
+        self._room = E, R = w.room
+        given, Q, noisy = p.given, p.process_noise.covariance, E if p.noise_varies else 1
+        self._linear = nu, H, dx = np.zeros(R * m), np.zeros((R * m, n)), np.zeros((E, n))
+        self._nu, self._S = np.zeros((R, m)), np.zeros((R, m, m))
+        self._oldest_covariance, self._newest_covariance = np.zeros((E, n, n)), np.zeros((n, n))
+        epochs = w.t, w.count, w.scale, w.first_row
+        self._predict_once: Callable[[], None] = self._library.live_append.bind(self._span, w.t, w.count, given, w.x)
+        self._retire: Callable[[], None] = self._library.live_retire.bind(
+            self._span, *epochs, given, Q, self._m, self._P, w.x, nu, H, dx
+        )
+        self._solve: Callable[[], None] = self._library.live_settle.bind(
+            self._span,
             self.iterations,
-            self._t,
-            self._count,
-            self._scale,
-            self._first_row,
-            self._z,
-            self._station,
+            *epochs,
+            w.z,
+            w.station,
             p.station_sensor,
             p.station_numbers,
             p.station_noise,
             p.station_correlated,
-            p.given,
-            p.process_noise.covariance,
+            given,
+            Q,
             self._m,
             self._P,
-            *space,
-            self._x,
-            self._late_covariance,
-            self.covariance,
+            np.zeros((E, n)),
+            np.zeros((E, n, n)),
+            np.zeros((noisy, n, n)),
             nu,
-            S,
-            0,
+            H,
+            np.zeros((E, n)),
+            np.zeros((E, n, n)),
+            np.zeros((R * m + n, n + 1)),
+            np.zeros((E, n)),
+            dx,
+            row_space(p, self._loss, R),
+            np.zeros((n, n)),
+            w.x,
+            self._oldest_covariance,
+            self._newest_covariance,
+            self._nu,
+            self._S,
         )
-        self.mean = self._x[-1].copy()
-        self._newest = self.mean.copy(), self.covariance.copy()
-        return nu, S
 
-    def _buffers(self) -> tuple[Array, ...]:
-        """Work space of at least the window's size; it keeps the last linearisation for when the oldest state leaves."""
-        W, J, n, m = len(self._t), len(self._z), self.problem.model.n, self.problem.model.width
-        if self._capacity[0] < W or self._capacity[1] < J:
-            big, rows = 2 * W, 2 * J
-            self._capacity = (big, rows)
-            self._nu_lin, self._H_lin, self._dx = np.empty(rows * m), np.empty((rows * m, n)), np.empty((big, n))
-            Q_all = np.empty((big if self.problem.noise_varies else 1, n, n))
-            self._space = (
-                np.empty((big, n)),
-                np.empty((big, n, n)),
-                Q_all,
-                self._nu_lin,
-                self._H_lin,
-                np.empty((big, n)),
-                np.empty((big, n, n)),
-                np.empty((rows * m + n, n + 1)),
-                np.empty((big, n)),
-                self._dx,
-                row_space(self.problem, self._loss, rows),
-                np.empty((n, n)),
-            )
-            self._late_covariance = np.empty((big, n, n))
-        return self._space
+    # ---- checkpoints ---------------------------------------------------------------------------------------------
 
     def checkpoint(self) -> dict[str, Array]:
         """Everything that the next call depends on, as arrays; `restore` takes it back."""
-        out = {name: np.array(getattr(self, "_" + name)) for name in _KEPT}
-        W, J, m = len(self._t), len(self._z), self.problem.model.width
-        if self._capacity[0]:
-            nu = self._nu_lin[: J * m].copy()
-            H = np.where(np.isnan(nu)[:, None], 0.0, self._H_lin[: J * m])  # rows of what is missing were never written
-            out |= {"nu_lin": nu, "H_lin": H, "dx": self._dx[:W].copy()}
-            out["oldest_covariance"] = self._late_covariance[0].copy()
+        window, out = self._window, {"m": self._m.copy(), "P": self._P.copy(), **self._window.copied()}
+        W, J, m = len(window), window.rows, self.problem.model.width
+        if W:
+            nu, H, dx = self._linear
+            H = np.where(np.isnan(nu[: J * m])[:, None], 0.0, H[: J * m])  # what is missing has none
+            out |= {"nu_lin": nu[: J * m].copy(), "H_lin": H, "dx": dx[:W].copy()}
+            out["oldest_covariance"] = self._oldest_covariance[window.first].copy()
         return out | {
             "mean": self.mean.copy(),
             "covariance": self.covariance.copy(),
@@ -320,9 +275,8 @@ class LiveWindow:
         checked = Saved(saved, self.problem)
         W, (z, station) = checked.length("t"), checked.measurements("z", "station")
         J = len(z)
+        before, P = checked.mean("m"), checked.covariance("P")
         found = {
-            "m": checked.mean("m"),
-            "P": checked.covariance("P"),
             "t": checked.array("t", W),
             "count": checked.whole("count", W, 0, MOST_STEPS),
             "scale": checked.array("scale", W),
@@ -340,15 +294,13 @@ class LiveWindow:
         if W:
             linear = checked.array("nu_lin", J * m, missing=True), checked.array("H_lin", J * m, n), checked.array("dx", W, n)
             oldest = checked.covariance("oldest_covariance")
-        for name in _KEPT:  # from here on, nothing can go wrong
-            setattr(self, "_" + name, found[name])
+        self._m, self._P = before.copy(), P.copy()  # from here on, nothing can go wrong
+        self._window = Stretch.of(n, m, found)
         self.mean, self.covariance = mean, covariance
         self._newest = mean.copy(), covariance.copy()
         self.innovation, self.innovation_covariance = nu, S
+        self._bind()
         if W:
-            self._buffers()
-            self._nu_lin[: J * m], self._H_lin[: J * m], self._dx[:W] = linear
-            self._late_covariance[0] = oldest
-
-
-_KEPT = ("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before")
+            for values, kept in zip(self._linear, linear, strict=True):
+                values[: len(kept)] = kept
+            self._oldest_covariance[0] = oldest

@@ -1,41 +1,43 @@
-"""Sliding window one measurement at a time: the same pieces as over a whole run, on buffers that stay between calls."""
+"""Sliding window one measurement at a time: the same pieces as over a whole run, on buffers that stay between calls.
+
+`span` says which epochs a call is about: the oldest and the newest, or, of those that leave, the first and the one behind them.
+"""
 
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
-def live_append(k: int, t: Array, count: Indices, p: Array, x: Array) -> None:
+def live_append(span: Indices, t: Array, count: Indices, p: Array, x: Array) -> None:
+    k = span[1]
     store(x, k * N, travel(t[k - 1], t[k] - t[k - 1], count[k], load_vector(x, (k - 1) * N, N), p))
 
 
 @entry
 def live_retire(
-    a: int,
-    base: int,
+    span: Indices,
     t: Array,
     count: Indices,
     scale: Array,
     first_row: Indices,
     p: Array,
     Q: Array,
+    m: Array,
+    P: Array,
     x: Array,
     nu: Array,
     H: Array,
     dx: Array,
-    m: Array,
-    P: Array,
 ) -> None:
-    m_next, P_next = retire(
-        a, base, t, count, scale, first_row, p, Q_matrix(Q), x, nu, H, dx, load_vector(m, 0, N), load_matrix(P, 0, N, N)
-    )
-    store(m, 0, m_next)
-    store(P, 0, P_next)
+    m_now, P_now = load_vector(m, 0, N), load_matrix(P, 0, N, N)
+    for a in range(span[0], span[1]):
+        m_now, P_now = retire(a, span[0], t, count, scale, first_row, p, Q_matrix(Q), x, nu, H, dx, m_now, P_now)
+    store(m, 0, m_now)
+    store(P, 0, P_now)
 
 
 @entry
 def live_settle(
-    a: int,
-    k: int,
+    span: Indices,
     iterations: int,
     t: Array,
     count: Indices,
@@ -64,12 +66,12 @@ def live_settle(
     work: Array,
     L: Array,
     x: Array,
-    delayed_covariance: Array,
+    oldest_covariance: Array,
     covariance: Array,
     innovation: Array,
     innovation_covariance: Array,
-    all_covariances: int,
 ) -> None:
+    a, k = span[0], span[1]
     nu_row, H_row = scratch(M), scratch(MN)
     P_new = settle(
         a,
@@ -104,12 +106,8 @@ def live_settle(
         work,
         L,
         x,
-        delayed_covariance,
+        oldest_covariance,
         innovation,
         innovation_covariance,
     )
     store(covariance, 0, P_new)
-    if all_covariances:
-        marginal_covariances(
-            a, k - a + 1, scale, first_row, Q_matrix(Q), Q_all, Phi, nu, H, P_pred, P_new, 0, delayed_covariance, L
-        )
