@@ -15,7 +15,8 @@ import pytest
 import piazzi
 from piazzi.study import run_study, same_results
 from piazzi.study.cluster import Cluster
-from piazzi.study.pieces import Task, run_task
+from piazzi.study.pieces import run_task
+from piazzi.study.tasks import Task
 from tests.study.studies import small
 
 pytest.importorskip("distributed", reason="Dask is not installed")

@@ -14,9 +14,10 @@ import pytest
 
 from piazzi.present.studies import failures
 from piazzi.study import execute, pieces, pool, read_store, run_study, same_results, versions
-from piazzi.study.pieces import Task, simulated
 from piazzi.study.pool import Processes
 from piazzi.study.runner import RETRIES
+from piazzi.study.runs import simulated
+from piazzi.study.tasks import Task
 from tests.study.estimators import Poison
 from tests.study.studies import small
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from piazzi.study.log import Log
-from piazzi.study.pieces import Piece, Task
+from piazzi.study.tasks import Piece, Task
 
 SPECIFICATION = {"runs": 9}
 

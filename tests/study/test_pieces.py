@@ -9,9 +9,11 @@ from piazzi.evaluate import evaluate
 from piazzi.evaluate.bounds import posterior_bounds
 from piazzi.simulation import true_problem
 from piazzi.study.bound import bound_at
-from piazzi.study.pieces import Task, run_task, simulated
+from piazzi.study.pieces import run_task
 from piazzi.study.plan import MOST_EPOCHS, Study
+from piazzi.study.runs import simulated
 from piazzi.study.score import NUMBERS
+from piazzi.study.tasks import Task
 from tests.laws.problems import b612, satellite
 from tests.study.estimators import Refusing
 from tests.study.studies import drawn_truth, small
@@ -114,7 +116,7 @@ def test_problems_that_need_more_than_lanes_are_the_same_study(change):
 def test_lanes_and_single_runs_are_the_same_truths(monkeypatch):
     study = small(problem=drawn_truth(), estimators=("ekf",))
     together = simulated(study, Task(0, 0, 9))
-    monkeypatch.setattr("piazzi.study.pieces.in_lanes", lambda problem: False)
+    monkeypatch.setattr("piazzi.study.runs.in_lanes", lambda problem: False)
     alone = simulated(study, Task(0, 0, 9))
     assert_allclose(alone.truth, together.truth, rtol=1e-11, atol=1e-11)
     assert_allclose(alone.z, together.z, rtol=1e-11, atol=1e-11)

@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 import pytest
 
 from piazzi.study.log import Log
-from piazzi.study.pieces import Task, lost
+from piazzi.study.pieces import lost
 from piazzi.study.pool import Outcome
 from piazzi.study.runner import MOST_DEATHS, RETRIES, Runner, missing
+from piazzi.study.tasks import Task
 from tests.study.studies import small
 
 

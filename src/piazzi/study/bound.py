@@ -9,7 +9,10 @@ import numpy as np
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.simulation import true_problem
+from piazzi.study.lanes import Layout, compiles, filter_runs, in_lanes
 from piazzi.study.plan import BOUND_RUNS, Study
+from piazzi.study.runs import simulated
+from piazzi.study.tasks import Task
 
 SLOW_RUNS = 64  # truths where each takes a filter and a smoother of its own
 
@@ -26,8 +29,6 @@ def bound_at(study: Study, point: int) -> dict[str, Array]:
     bound_whole, bound_last_half : (2, G), roots of the means over the whole run and over its last half
     bound_runs : (2,), how many truths, the first of the point, were averaged over
     """
-    from piazzi.study.pieces import Task, simulated
-
     views = [view for _, view in study.rows]
     runs = simulated(study, Task(point, 0, min(study.runs, BOUND_RUNS, study.largest_piece)))  # memory stays flat
     good = [i for i, wrong in enumerate(runs.wrong) if not wrong]
@@ -59,9 +60,6 @@ def _arrays(study: Study, variance: Array, count: Array) -> dict[str, Array]:
 
 
 def _realtime(study: Study, actual: Problem, truth: Array, z: Array, trackings: list[Tracking]) -> tuple[Array, int]:
-    from piazzi.study.lanes import Layout, filter_runs, in_lanes
-    from piazzi.study.pieces import compiles
-
     layout = Layout(actual, study.times)
     if not (in_lanes(actual) and compiles(filter_runs, layout, z[:1], truth[:1])):
         return _mean(study, actual, trackings, "realtime")

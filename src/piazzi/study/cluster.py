@@ -12,9 +12,10 @@ from functools import lru_cache
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from piazzi.study.pieces import Piece, Task, run_task
+from piazzi.study.pieces import run_task
 from piazzi.study.plan import Study
 from piazzi.study.pool import THREADS, Outcome, processors
+from piazzi.study.tasks import Piece, Task
 from piazzi.study.versions import difference_of, fingerprint
 
 if TYPE_CHECKING:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +16,8 @@ from piazzi import kernels
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+
+LOGGER = logging.getLogger("piazzi.study")
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,3 +241,21 @@ def _padded(lanes: int, *arrays: Array) -> tuple[Array, ...]:
     if missing > 0:
         arrays = tuple(np.concatenate([a, np.repeat(a[-1:], missing, axis=0)]) for a in arrays)
     return tuple(np.ascontiguousarray(a) for a in arrays)
+
+
+_refused: dict[tuple[Any, ...], bool] = {}
+
+
+def compiles(function: Callable[..., Any], layout: Layout, *args: Any) -> bool:
+    """Whether the kernel in lanes can be made for this problem; a model of constants, say, has no lanes to speak of."""
+    problem = layout.problem
+    assert problem.integrator is not None
+    key = (function.__name__, problem.model, problem.integrator.scheme)
+    if key not in _refused:
+        try:
+            function(layout, *args)
+            _refused[key] = False
+        except Exception:  # Numba's own kinds of errors, which are not imported here
+            LOGGER.debug("no lanes for %s", problem.name, exc_info=True)
+            _refused[key] = True
+    return not _refused[key]

@@ -14,7 +14,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from piazzi.study.pieces import Piece, Task
+from piazzi.study.tasks import Piece, Task
 
 ENDING = ".runs"
 _MAGIC = b"PZRUNS1\n"

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import IO, Protocol
 
-from piazzi.study.pieces import Piece, Task, run_task
+from piazzi.study.pieces import run_task
 from piazzi.study.plan import Study
+from piazzi.study.tasks import Piece, Task
 
 _LENGTH = struct.Struct("<Q")
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")

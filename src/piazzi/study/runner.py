@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterator
 from math import ceil
 
 from piazzi.study.log import Log
-from piazzi.study.pieces import Piece, Task, lost
+from piazzi.study.pieces import lost
 from piazzi.study.plan import Study
 from piazzi.study.pool import Outcome, Workers
+from piazzi.study.tasks import Piece, Task
 
 Progress = Callable[[int, int], None]
 FIRST_PIECE = 8  # runs, before anything is known about how long one takes

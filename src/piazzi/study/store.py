@@ -16,9 +16,9 @@ from piazzi.io import hdf5
 from piazzi.io.atomic import atomic_path
 from piazzi.problem.checks import Array
 from piazzi.study.log import Log
-from piazzi.study.pieces import Piece, Task
 from piazzi.study.plan import SCHEMA, Study
 from piazzi.study.score import NUMBERS
+from piazzi.study.tasks import Piece, Task
 
 if TYPE_CHECKING:
     from piazzi.study.summary import Summary
