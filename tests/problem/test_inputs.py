@@ -1,7 +1,8 @@
 """What kernels are given is laid out once for a problem and its tracking."""
 
+import copy
 import pickle
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 
 import numpy as np
 import pytest
@@ -40,6 +41,52 @@ def test_addresses_stay_in_their_process():
     again = pickle.loads(pickle.dumps((problem, tracking)))
     estimator = pz.ExtendedKalmanFilter()
     assert_array_equal(estimator.estimate(*again).mean, estimator.estimate(problem, tracking).mean)
+
+
+def pickled(thing):
+    return pickle.loads(pickle.dumps(thing))
+
+
+def arrays(value, name=""):
+    """Every array in a value, by the way to it."""
+    if isinstance(value, np.ndarray):
+        return {name: value}
+    parts = vars(value) if is_dataclass(value) else value if isinstance(value, dict) else {}
+    parts = dict(enumerate(value)) if isinstance(value, (list, tuple)) else parts
+    return {way: a for key, part in parts.items() for way, a in arrays(part, f"{name}.{key}").items()}
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickled, replace])
+def test_nothing_can_be_written_into_a_copy_and_it_remembers_nothing(copied):
+    """Else what was laid out for kernels would no longer be what the copy says."""
+    problem, tracking = eventful()
+    fresh = arrays(problem), arrays(tracking)
+    prepare(problem, tracking)
+    for thing, own in zip((problem, tracking), fresh, strict=True):
+        again = copied(thing)
+        assert "_prepared" not in vars(again)
+        assert arrays(again).keys() == own.keys() > set()
+        assert [way for way, a in arrays(again).items() if a.flags.writeable] == []
+    assert prepare(copied(problem), copied(tracking)) is not prepare(problem, tracking)
+
+
+def eventful():
+    """A problem with arrays in every part, and its tracking."""
+    prior = pz.Gaussian([11.0, 0.0, 0.0, 10.0], np.eye(4))
+    burn = pz.Manoeuvre(1.5, [0.1, 0.0], [1e-4, 1e-4])
+    base = b612()
+    station = replace(base.stations[0], numbers={"mx": 10.0, "my": pz.Gaussian(0.0, 1e-4)})
+    problem = replace(base, prior=prior, stations=[station], manoeuvres=[burn])
+    names = np.full(4, station.name)
+    return problem, pz.Tracking(np.arange(4.0), np.ones(4), names, np.ones((4, 4)))
+
+
+def test_the_truth_of_a_copied_problem_stays_the_users_own():
+    state = np.array([11.0, 0.0, 0.0, 10.0])
+    problem = replace(b612(), truth=pz.Truth(state))
+    copy.copy(problem)
+    state[0] = 12.0
+    assert problem.truth.state is state
 
 
 def test_a_problem_that_does_not_fit_leaves_what_was_laid_out():

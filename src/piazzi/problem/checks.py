@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,19 @@ def frozen(a: Any) -> Array:
     out = np.array(a, dtype=float)
     out.setflags(write=False)
     return out
+
+
+def lock(value: Any) -> None:
+    """Make every array in the value and in its parts read-only: copies and unpickled arrays are not."""
+    if isinstance(value, np.ndarray):
+        value.setflags(write=False)
+    elif is_dataclass(value):
+        lock(vars(value))
+    elif isinstance(value, dict):
+        lock(tuple(value.values()))
+    elif isinstance(value, (list, tuple)):
+        for part in value:
+            lock(part)
 
 
 def numeric(value: Any, what: str) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
@@ -14,7 +14,7 @@ from piazzi.expressions.errors import suggest
 from piazzi.kernels import Discrete, Integrator, Kepler, KernelSpec, RungeKutta4
 from piazzi.model import Model, nearest
 from piazzi.problem import functions, manoeuvres
-from piazzi.problem.checks import Array, covariance, finite_vector, frozen, numeric
+from piazzi.problem.checks import Array, covariance, finite_vector, frozen, lock, numeric
 from piazzi.problem.composition import composed
 from piazzi.problem.constants import with_station_constants
 from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
@@ -87,6 +87,11 @@ class Problem:
     def __getstate__(self) -> dict[str, Any]:
         """Without the specifications of kernels, which this process shares among problems."""
         return {name: value for name, value in self.__dict__.items() if name != "specs"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Nothing can be written into a copy either; the truth is the user's own, as it was given."""
+        self.__dict__.update(state)
+        lock({name: value for name, value in state.items() if name not in ("model", "truth")})
 
     # ---- checks --------------------------------------------------------------------------------------------------
 
@@ -207,7 +212,7 @@ class Problem:
     def station_sensor(self) -> Array:
         """Index of each station's sensor, (S,)."""
         names = [s.name for s in self.model.sensors]
-        return np.array([names.index(s.sensor) for s in self.stations], dtype=np.int64)
+        return _indices(names.index(s.sensor) for s in self.stations)
 
     @cached_property
     def considered(self) -> tuple[str, ...]:
@@ -236,7 +241,7 @@ class Problem:
     @cached_property
     def station_correlated(self) -> Array:
         """For each station, 1 where its R is not diagonal, (S,)."""
-        return np.array([not _is_diagonal(s.noise) for s in self.stations], dtype=np.int64)
+        return _indices(not _is_diagonal(s.noise) for s in self.stations)
 
     @cached_property
     def is_correlated(self) -> bool:
@@ -339,6 +344,12 @@ def _number(value: Any, what: str) -> float:
     if out.size != 1 or not np.isfinite(out).all():
         raise ValueError(f"{what} is {value!r}; it must be one finite number")
     return float(out.reshape(-1)[0])
+
+
+def _indices(values: Iterable[int]) -> Array:
+    out = np.array([*values], dtype=np.int64)
+    out.setflags(write=False)
+    return out
 
 
 def _is_diagonal(R: Array) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.problem.checks import Array, frozen, numeric
+from piazzi.problem.checks import Array, frozen, lock, numeric
 
 if TYPE_CHECKING:
     from piazzi.problem.problem import Problem
@@ -65,6 +65,11 @@ class Tracking:
         """Without what `prepare` keeps: it belongs to one problem in one process."""
         return {name: value for name, value in self.__dict__.items() if name != "_prepared"}
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Nothing can be written into a copy either, so that what `prepare` keeps of it stays right."""
+        self.__dict__.update(state)
+        lock(state)
+
     def _checked_times(self) -> Array:
         times = numeric(self.row_times, "times").reshape(-1)
         if not times.size:
@@ -107,7 +112,9 @@ class Tracking:
     def first_row(self) -> Array:
         new = np.ones(len(self.row_times) + 1, dtype=bool)  # the end counts as the first row of an epoch after the last
         np.greater(self.row_times[1:], self.row_times[:-1], out=new[1:-1])
-        return np.flatnonzero(new).astype(np.int64, copy=False)
+        first = np.flatnonzero(new).astype(np.int64, copy=False)
+        first.setflags(write=False)
+        return first
 
     @cached_property
     def times(self) -> Array:
