@@ -11,12 +11,17 @@ import pytest
 import piazzi as pz
 from piazzi.estimate import Estimate
 from piazzi.evaluate import Comparison, compare, evaluate, posterior_bounds
+from piazzi.evaluate.display import columns
+from piazzi.evaluate.quantities import ideal
+from piazzi.present.report.words import points
+from piazzi.present.squares import nees_of
 from piazzi.scenarios import load_scenario
 from tests.evaluate.conftest import made
 
 ROW = {
     "estimator", "view", "success", "message", "iterations", "seconds", "position_rmse", "velocity_rmse",
     "position_rmse_last_half", "velocity_rmse_last_half", "mean_nees", "mean_nees_last_half", "mean_nis", "diverged",
+    "nees_ideal", "nees_ideal_last_half",
     "position_crlb", "velocity_crlb", "position_crlb_last_half", "velocity_crlb_last_half", "convergence_time",
     "nees_low", "nees_high", "nees_last_half_low", "nees_last_half_high", "nees_effective_epochs",
     "nis_low", "nis_high", "whiteness", "whiteness_high", "bias", "bias_high",
@@ -47,6 +52,16 @@ def compared(**results: Any) -> Comparison:
 def good() -> Estimate:
     rng = np.random.default_rng(2)
     return made(rng.standard_normal((41, 2)), np.eye(2), truth=np.zeros((41, 2)), groups=POSITION)
+
+
+@pytest.fixture
+def singular() -> Estimate:
+    """Errors of one direction, as large as a covariance of rank 1 says, in four states; rank 2 at the first epoch."""
+    rng = np.random.default_rng(2)
+    along = np.array([1.0, 2.0, -1.0, 0.5])
+    covariance = np.broadcast_to(np.outer(along, along), (40, 4, 4)).copy()
+    covariance[0] += np.diag([0.0, 0.0, 0.0, 1.0])
+    return made(rng.standard_normal((40, 1)) * along, covariance, truth=np.zeros((40, 4)), groups={"position": ["a", "b"]})
 
 
 def strict(text: str) -> Any:
@@ -295,3 +310,28 @@ def test_outliers_and_modes_are_told(good):
         found = compared(**{first: estimates[first], second: estimates[second]}).to_dataset()["outliers"].values
         assert sorted(found.tolist(), key=np.isnan)[0] == 2
         assert np.isnan(found).sum() == 1
+
+
+def test_errors_of_a_singular_covariance_are_judged_by_its_rank(singular):
+    """Beside the number of states they would be called half as large as they are."""
+    comparison = compared(flat=singular)
+    row = comparison.to_dict()["rows"][0]
+    assert (row["nees_ideal"], row["nees_ideal_last_half"]) == (41 / 40, 1.0)
+    assert row["mean_nees_last_half"] == pytest.approx(np.mean(singular.mean[20:, 0] ** 2))
+    assert [c.unit for c in columns(comparison) if c.name == "mean NEES"] == ["ideal 1.02", "ideal 1"]
+    assert "Errors of flat are about as large as the covariance says (NEES of this one run)." in str(comparison)
+    assert [p.heading for p in points(comparison) if "covariance says" in p.text] == ["Covariance holds"]
+    squares = nees_of(comparison)
+    assert (squares.expected, squares.ideal) == (41 / 40, "ideal 1.02")
+
+
+def test_what_is_ideal_is_told_for_all_rows(singular):
+    """From the smallest to the largest where they differ, and over the states whose truth is known."""
+    truth = singular.tracking.truth.copy()
+    regular = made(singular.mean, np.eye(4), truth=truth)
+    truth[:, 3] = np.nan
+    partly = made(singular.mean, np.eye(4), truth=truth)
+    rows = [evaluate("any", e, thorough=False) for e in (singular, regular, partly)]
+    assert [r.nees_ideal_last_half for r in rows] == [1.0, 4.0, 3.0]
+    assert ideal(r.nees_ideal_last_half for r in rows) == "ideal 1 to 4"
+    assert ideal([None]) == "ideal -"

@@ -8,6 +8,8 @@ import pytest
 
 import piazzi as pz
 from piazzi.evaluate.window_trade import head, steps_of, timed_sizes
+from piazzi.present.report.windows import windows_section
+from tests.laws.problems import b612
 
 
 @cache
@@ -65,6 +67,16 @@ def test_dataset_has_units_and_both_views():
     assert data["position_rmse"].dims == ("lag", "view")
     assert data["position_rmse"].sel(lag=5, view="delayed").item() == trade().delayed[1].rmse["position"]
     assert data["seconds"].attrs["units"] == "s"
+
+
+def test_windows_of_a_singular_covariance_are_judged_by_its_rank():
+    """Two unknown directions and no process noise: all windows have covariances of rank 2."""
+    prior = pz.Gaussian.from_sigma([11, 0, 0, 10], [1e-3, 0, 0, 1e-3])
+    problem = b612(truth=None, prior=prior, process_noise=pz.ProcessNoise(np.zeros(4), "step"))
+    found = pz.windows(problem, pz.simulate(problem, np.arange(20) * 0.1, np.random.default_rng(0)), [1, 5], graph=False)
+    assert found.ideal_nees("realtime", "delayed") == (2.0,)
+    assert "(ideal 2)" in str(found)
+    assert windows_section(found).blocks[3].title == "Mean NEES, last half, ideal 2"
 
 
 def test_without_truth_cost_and_nis_stand():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, number, printable, sigma_factor, unit_of
+from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, printable, sigma_factor, unit_of
 from piazzi.model import Model
 
 if TYPE_CHECKING:
@@ -63,16 +63,11 @@ def columns(comparison: Comparison) -> list[Column]:
             found.append(Column(f"{printable(group)} RMSE", part, printable(show.unit), tuple(shown)))
         bounds = (number(_times(r.crlb_last_half.get(group), show.factor)) for r in rows)
         found.append(Column(f"{printable(group)} {BOUND}", "last half", printable(show.unit), tuple(bounds)))
-    ideal_nis = number(expected_nis(comparison), 3)
+    whole, half = (ideal(r.nees_ideal for r in rows), ideal(r.nees_ideal_last_half for r in rows))
     found += [
-        Column("mean NEES", "whole run", f"ideal {comparison.problem.model.n}", tuple(number(r.mean_nees, 3) for r in rows)),
-        Column(
-            "mean NEES",
-            "last half",
-            f"ideal {comparison.problem.model.n}",
-            tuple(number(r.mean_nees_last_half, 3) for r in rows),
-        ),
-        Column("mean NIS", "", f"ideal {ideal_nis}", tuple(number(r.mean_nis, 3) for r in rows)),
+        Column("mean NEES", "whole run", whole, tuple(number(r.mean_nees, 3) for r in rows)),
+        Column("mean NEES", "last half", half, tuple(number(r.mean_nees_last_half, 3) for r in rows)),
+        Column("mean NIS", "", ideal([expected_nis(comparison)]), tuple(number(r.mean_nis, 3) for r in rows)),
         Column(TESTS, "", "5 % each", tuple(", ".join(failing(r)) or (PASSED if tested(r) else "") for r in rows)),
         Column("iterations", "", "", tuple(str(r.iterations) if r.iterations else NOTHING for r in rows)),
         Column("time", "", "", tuple(duration(r.seconds) for r in rows)),
@@ -196,7 +191,7 @@ def sentences(comparison: Comparison) -> list[str]:
     out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down." for name in wayward]
     out += [*_rejected(comparison), *_modes(comparison)]
     if any(v is not None for r in sound for v in r.rmse.values()):
-        out += [*_best(comparison, sound), *_honest(comparison, sound)]
+        out += [*_best(comparison, sound), *_honest(sound)]
     elif sound:
         out += _without_truth(comparison, sound)
     return [printable(line) for line in [*out, *_tested(sound)]]
@@ -262,10 +257,9 @@ def _best(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
     return [f"Smallest {group} error in the last half of the run: {name} ({_VIEW.get(view, view)}), {error} (RMS)."]
 
 
-def _honest(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
-    n = comparison.problem.model.n
-    nees = {_named(r, rows): r.mean_nees_last_half for r in rows}
-    factors = {name: sigma_factor(v, n) for name, v in nees.items() if v is not None and np.isfinite(v)}
+def _honest(rows: Sequence[Row]) -> list[str]:
+    nees = {_named(r, rows): (r.mean_nees_last_half, r.nees_ideal_last_half) for r in rows}
+    factors = {name: sigma_factor(v, n) for name, (v, n) in nees.items() if v is not None and n and np.isfinite(v)}
     return [f"Errors of {names} are {claim} (NEES of this one run)." for claim, names in _by_claim(factors).items()]
 
 

@@ -33,6 +33,11 @@ class Consistency:
         known = self.value[rows][self.rank[rows] > 0]
         return float(known.mean()) if known.size else None
 
+    def ideal(self, rows: slice = slice(None)) -> float | None:
+        """What that mean should be: the mean number of directions, None where there are none."""
+        known = self.rank[rows][self.rank[rows] > 0]
+        return float(known.mean()) if known.size else None
+
 
 def errors(estimate: Estimate) -> Array | None:
     """Estimate minus truth, (K, n), NaN where either is; None where nothing of the truth is known.

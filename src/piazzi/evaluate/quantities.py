@@ -95,6 +95,17 @@ def unit_of(units: Iterable[str]) -> str:
     return found.pop() if len(found) == 1 else ""
 
 
+def ends(values: Iterable[float | None]) -> tuple[float, ...]:
+    """The smallest and the largest of the values that there are, to three digits: one where they are the same."""
+    found = sorted({float(f"{v:.3g}") for v in values if v is not None})
+    return tuple(dict.fromkeys((found[0], found[-1]))) if found else ()
+
+
+def ideal(values: Iterable[float | None]) -> str:
+    """What a mean NEES or NIS should be, in words, where estimators differ from the smallest to the largest."""
+    return f"ideal {' to '.join(f'{v:g}' for v in ends(values)) or NOTHING}"
+
+
 def sigma_factor(mean_squared: float, expected: float) -> float:
     """How many times larger errors are than their covariance says, from a mean NEES or NIS and its expectation."""
     return sqrt(mean_squared / expected)

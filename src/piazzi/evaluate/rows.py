@@ -27,7 +27,8 @@ class Row:
     rmse, rmse_last_half : one number for each group of states; the last half is rows K//2 onward
     crlb, crlb_last_half : the posterior Cramer-Rao bound of the same, for this view and this truth: no estimator that is
         unbiased does better on average, a single run may
-    mean_nees, mean_nees_last_half, mean_nis : honesty; near n, n and the number of components per row
+    mean_nees, mean_nees_last_half, mean_nis : honesty; near `nees_ideal`, `nees_ideal_last_half` and the components per row
+    nees_ideal, nees_ideal_last_half : mean rank of the covariance, over the states whose truth is known; n where it is regular
     honesty : Honesty, tests of that with bounds
     convergence_time : seconds until the error of the first group stays, in the RMS of all that follows, within twice its last
         half's
@@ -56,6 +57,8 @@ class Row:
     rejected: int | None = None
     outliers: int | None = None
     modes: Sequence[Mapping[str, Any]] | None = None
+    nees_ideal: float | None = None
+    nees_ideal_last_half: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The row in the contract's names, numbers that are not finite as None."""
@@ -64,7 +67,8 @@ class Row:
         out["seconds"] = finite(self.seconds)
         out |= {f"{g}_rmse": finite(self.rmse.get(g)) for g in names}
         out |= {f"{g}_rmse_last_half": finite(self.rmse_last_half.get(g)) for g in names}
-        out |= {k: finite(getattr(self, k)) for k in ("mean_nees", "mean_nees_last_half", "mean_nis")}
+        squares = ("mean_nees", "mean_nees_last_half", "nees_ideal", "nees_ideal_last_half", "mean_nis")
+        out |= {k: finite(getattr(self, k)) for k in squares}
         out["diverged"] = self.diverged
         out |= {f"{g}_crlb": finite(self.crlb.get(g)) for g in names}
         out |= {f"{g}_crlb_last_half": finite(self.crlb_last_half.get(g)) for g in names}
@@ -130,6 +134,8 @@ def evaluate(name: str, estimate: Estimate, bounds: Bounds | None = None, *, tho
         rejected=estimate.details.get("rejected_count"),
         outliers=outliers(estimate),
         modes=estimate.details.get("modes"),
+        nees_ideal=consistency.ideal() if consistency else None,
+        nees_ideal_last_half=consistency.ideal(last) if consistency else None,
     )
 
 

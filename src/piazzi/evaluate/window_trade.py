@@ -13,7 +13,7 @@ from piazzi.estimate import FactorGraph, SlidingWindow
 from piazzi.evaluate.bounds import Bounds
 from piazzi.evaluate.comparison import bounds_of, failed
 from piazzi.evaluate.grids import as_text
-from piazzi.evaluate.quantities import finite
+from piazzi.evaluate.quantities import ends, finite
 from piazzi.evaluate.rows import Row, evaluate
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
@@ -103,9 +103,13 @@ class WindowTrade:
         return np.array([np.nan if v is None else v for v in rows])
 
     def mean_nees(self, view: str = "realtime", *, last_half: bool = True) -> Array:
-        """Mean NEES against window length, (L,), NaN where it is not known; n is ideal."""
+        """Mean NEES against window length, (L,), NaN where it is not known; see `ideal_nees`."""
         rows = [row.mean_nees_last_half if last_half else row.mean_nees for row in self.rows(view)]
         return np.array([np.nan if v is None else v for v in rows])
+
+    def ideal_nees(self, *views: str) -> tuple[float, ...]:
+        """What mean NEES of the last half should be in these views, the smallest and the largest: one where they agree."""
+        return ends(row.nees_ideal_last_half for view in views for row in self.rows(view))
 
     def crlb(self, group: str, view: str = "realtime", *, last_half: bool = True) -> float | None:
         """Posterior Cramer-Rao bound of the RMSE of a group, the same for all lengths; None where it is not known."""

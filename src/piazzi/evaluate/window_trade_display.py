@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.evaluate.display import PASSED, failing, row_display, tested
 from piazzi.evaluate.grids import Grid, as_html, as_rich
-from piazzi.evaluate.quantities import duration, number
+from piazzi.evaluate.quantities import duration, ideal, number
 from piazzi.problem.checks import Array
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def _trade(trade: WindowTrade) -> Grid:
             columns.append(_texts(trade.rmse(group, view) * show.factor, 4))
     if trade.groups:
         for view, name in (("realtime", "real time"), ("delayed", "delayed")):
-            heads.append(f"mean NEES\n{name}\n(ideal {trade.problem.model.n})")
+            heads.append(f"mean NEES\n{name}\n({ideal(trade.ideal_nees(view))})")
             columns.append(_texts(trade.mean_nees(view), 3))
     heads += ["mean NIS", "per step"]
     columns.append(["-" if r.mean_nis is None else number(r.mean_nis, 3) for r in trade.realtime])

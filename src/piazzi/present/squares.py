@@ -9,7 +9,7 @@ import numpy as np
 from piazzi.estimate.chi_square import quantile
 from piazzi.evaluate import Comparison
 from piazzi.evaluate.metrics import Consistency, nees, nis
-from piazzi.evaluate.quantities import number
+from piazzi.evaluate.quantities import ideal
 from piazzi.problem.checks import Array
 
 _STRETCHES = 30  # parts of a run over which NIS is averaged
@@ -37,15 +37,21 @@ class Squares:
     @property
     def ideal(self) -> str:
         """The expected mean in words."""
-        return f"ideal {number(self.expected, 3) if self.expected % 1 else int(self.expected)}"
+        return ideal([self.expected])
 
 
 def nees_of(comparison: Comparison) -> Squares | None:
-    """NEES of every epoch; None without truth.  The range is chi-square's of as many degrees as there are states."""
-    found = [nees(e) for e in comparison.views.values()]
-    values = tuple(np.where(f.rank > 0, f.value, np.nan) for f in found if f is not None)
-    n = float(comparison.problem.model.n)
-    return Squares("NEES", comparison.tracking.times, values, n, quantile(0.025, n), quantile(0.975, n)) if values else None
+    """NEES of every epoch; None without truth.
+
+    The range is chi-square's of as many degrees as the covariances have directions, in the mean over epochs and estimators.
+    """
+    found = [f for e in comparison.views.values() if (f := nees(e)) is not None]
+    ranks = [n for f in found if (n := f.ideal()) is not None]
+    if not ranks:
+        return None
+    values = tuple(np.where(f.rank > 0, f.value, np.nan) for f in found)
+    n = float(np.mean(ranks))
+    return Squares("NEES", comparison.tracking.times, values, n, quantile(0.025, n), quantile(0.975, n))
 
 
 def nis_of(comparison: Comparison) -> Squares:

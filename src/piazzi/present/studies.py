@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, number, printable, unit_of
+from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, printable, unit_of
 from piazzi.problem.checks import Array
 from piazzi.study import Line, Stored, Summary
 
@@ -41,8 +41,7 @@ def point_name(point: Mapping[str, Any]) -> str:
 
 def ideal_nees(lines: Sequence[Line]) -> str:
     """What the mean NEES should be: how many directions of the error have any variance."""
-    found = sorted({float(f"{x.course.ideal:.2g}") for x in lines if x.course.ideal is not None})
-    return f"ideal {' to '.join(f'{v:g}' for v in dict.fromkeys((found[0], found[-1]))) if found else NOTHING}"
+    return ideal(x.course.ideal for x in lines)
 
 
 def widest_bounds(lines: Sequence[Line]) -> Array | None:

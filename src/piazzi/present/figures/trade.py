@@ -40,8 +40,8 @@ def window_consistency(ax: Axes, trade: WindowTrade) -> Axes:
     """Mean NEES of the last half against window length, both views, beside the full graph and the ideal."""
     values = {view: trade.mean_nees(view) for view, _, _ in _STYLES}
     _against_length(ax, trade, values, trade.graph.mean_nees_last_half if trade.graph else None)
-    n = trade.problem.model.n
-    ax.axhline(n, color=MEASURED, lw=0.9, ls=(0, (5, 3)), label=f"ideal, {n}")
+    for n in trade.ideal_nees(*values):
+        ax.axhline(n, color=MEASURED, lw=0.9, ls=(0, (5, 3)), label=f"ideal, {n:g}")
     ax.set_ylabel("mean NEES, last half")
     return ax
 

@@ -89,8 +89,9 @@ def _reading() -> Section:
                     "RMSE is the root of the mean squared length of the error; the last half is what is left once an estimator"
                     " has settled. Real time means from measurements up to each epoch; delayed, that later ones helped too.",
                     "NEES is the squared error, NIS the squared innovation, in units of the covariance that the estimator"
-                    " claims. Their means should be near the number of states and of measured components. Errors of one run"
-                    " hang together over time, so one run proves little: try other seeds before relying on a covariance.",
+                    " claims. Their means should be near the number of states and of measured components; where a covariance is"
+                    " singular, near its rank. Errors of one run hang together over time, so one run proves little: try other"
+                    " seeds before relying on a covariance.",
                 ]
             )
         ],

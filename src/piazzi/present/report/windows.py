@@ -9,7 +9,7 @@ import numpy as np
 from piazzi.evaluate import WindowTrade
 from piazzi.evaluate.display import row_display
 from piazzi.evaluate.grids import Grid
-from piazzi.evaluate.quantities import Display
+from piazzi.evaluate.quantities import Display, ideal
 from piazzi.evaluate.window_trade_display import grids, sentences
 from piazzi.present.colours import COLOURS, DASHES
 from piazzi.present.report.blocks import Axis, Chart, Line, Point, Section, Tab, Table, Text
@@ -70,13 +70,13 @@ def _errors(trade: WindowTrade, group: str) -> Chart:
 
 
 def _nees(trade: WindowTrade) -> Chart:
-    n = trade.problem.model.n
     values = {view: trade.mean_nees(view) for view, _, _ in _VIEWS}
+    best = trade.ideal_nees(*values)
     lines = _lines(trade, values, trade.graph.mean_nees_last_half if trade.graph else None)
-    everything = np.concatenate([line.y for line in lines if isinstance(line.y, np.ndarray)] + [np.array([float(n)])])
+    everything = np.concatenate([line.y for line in lines if isinstance(line.y, np.ndarray)] + [np.array(best)])
     good = everything[np.isfinite(everything) & (everything > 0)]
     y = Axis("mean NEES", Display(""), "log", float(good.min()) / 1.5, 1.5 * float(good.max()))
-    return _chart(trade, f"Mean NEES, last half, ideal {n}", y, lines, levels=[(float(n), "ideal")])
+    return _chart(trade, f"Mean NEES, last half, {ideal(best)}", y, lines, levels=[(n, "ideal") for n in best])
 
 
 def _cost(trade: WindowTrade) -> Chart:

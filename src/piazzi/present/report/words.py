@@ -113,13 +113,14 @@ def _failed(rows: Sequence[Row]) -> list[Point]:
     return out
 
 
-def _judged(row: Row, known: bool, n: float, m: float | None) -> tuple[float, int] | None:
+def _judged(row: Row, known: bool, m: float | None) -> tuple[float, int] | None:
     """Errors (else innovations) in units of what the covariance says, and 1 where they are too large, -1 too small, else 0.
 
     By the test of mean NEES that allows for correlation in time, where there is one; else by a factor that one run can tell.
     """
     early = row.view != "realtime"
-    value, expected = ((row.mean_nees if early else row.mean_nees_last_half), n) if known else (row.mean_nis, m)
+    of_errors = (row.mean_nees, row.nees_ideal) if early else (row.mean_nees_last_half, row.nees_ideal_last_half)
+    value, expected = of_errors if known else (row.mean_nis, m)
     if value is None or not isfinite(value) or not expected:
         return None
     factor = sigma_factor(value, expected)
@@ -131,8 +132,8 @@ def _judged(row: Row, known: bool, n: float, m: float | None) -> tuple[float, in
 
 def _honesty(comparison: Comparison, rows: Sequence[Row], known: bool) -> list[Point]:
     """Whose covariance can be taken at its word."""
-    n, m = float(comparison.problem.model.n), expected_nis(comparison)
-    found = [(r, judged) for r in rows if (judged := _judged(r, known, n, m)) is not None]
+    m = expected_nis(comparison)
+    found = [(r, judged) for r in rows if (judged := _judged(r, known, m)) is not None]
     judged_rows, what = [r for r, _ in found], "Errors" if known else "Innovations"
     out = []
     for sign, heading, tone in _CLAIMS:
