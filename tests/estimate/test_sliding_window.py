@@ -103,6 +103,41 @@ def test_wide_prior_leaves_the_delayed_covariances_their_digits(monkeypatch):
     assert (np.abs(delayed.covariance - covariance) / (sigma[:, :, None] * sigma[:, None, :])).max() <= 1e-7
 
 
+@pytest.mark.parametrize("loss", [None, pz.Huber(1e6)])
+def test_a_prior_of_any_width_leaves_the_delayed_covariance_what_its_own_measurements_say(monkeypatch, loss):
+    """A mean of five: the oldest state of a window knows no less than its own measurement."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x"], ["0"], [pz.Sensor("place", ["x"])])
+    problem = pz.Problem(model, pz.Gaussian([0.0], [1e20]), None, [pz.Station("here", "place", 1.0)])
+    delayed = pz.SlidingWindow(5, loss=loss).estimate(problem, pz.Tracking(np.arange(12.0), np.ones(12))).delayed
+    assert_allclose(delayed.covariance[:5, 0, 0], 1 / np.arange(5.0, 10.0), rtol=1e-9)
+
+
+def test_what_nobody_sees_under_a_huge_prior_is_named_by_the_delayed_estimate(monkeypatch):
+    """In the words of the full graph, however few states a window keeps; in real time everything begins open."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["seen", "unseen"], ["0", "0"], [pz.Sensor("first", ["seen"])])
+    tracking = pz.Tracking(np.arange(12.0), np.linspace(1.0, 3.0, 12))
+    for variance, told in ((1e30, True), (1e2, False)):
+        problem = pz.Problem(model, pz.Gaussian([0.0, 5.0], [1e30, variance]), None, [pz.Station("here", "first", 1.0)])
+        graph = pz.FactorGraph().estimate(problem, tracking)
+        assert ("do not determine 'unseen'" in graph.message) == told
+        for lag in (1, 3, 12, 100):
+            window = pz.SlidingWindow(lag).estimate(problem, tracking)
+            assert window.delayed.message == graph.message
+            assert window.success
+
+
+def test_what_only_later_measurements_tell_is_no_open_question(monkeypatch):
+    """One place says nothing about the speed; what leaves a window of one state knows no more than that."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x", "v"], ["v", "0"], [pz.Sensor("place", ["x"])])
+    problem = pz.Problem(model, pz.Gaussian([0.0, 0.0], [1.0, 1e16]), None, [pz.Station("here", "place", 1.0)])
+    delayed = pz.SlidingWindow(1).estimate(problem, pz.Tracking(np.arange(8.0), np.arange(8.0))).delayed
+    assert delayed.covariance[0, 1, 1] == 1e16
+    assert delayed.success, delayed.message
+
+
 def test_window_that_leaves_the_numbers_says_when(monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     model = pz.Model(["quiet", "wild"], ["-quiet", "wild**3"], [pz.Sensor("both", ["quiet + wild"])])

@@ -11,7 +11,7 @@ OPEN = 1e6  # times the size of a value: a prior that wide says that it is not k
 UNTOUCHED = 0.9  # of the prior's variance: the measurements said nothing
 
 
-def undetermined(problem: Problem, first: Array, states: Array) -> str:
+def undetermined(problem: Problem, first: Array, states: Array, last: Array | None = None) -> str:
     """A line naming the direction that a wide prior left open and the measurements did not close, "" if there is none.
 
     Parameters
@@ -19,20 +19,29 @@ def undetermined(problem: Problem, first: Array, states: Array) -> str:
     problem : Problem
     first : (n, n), covariance of the first state given all measurements
     states : (K, n), estimates, which tell how large each value (each group, as a vector) is
+    last : (n, n), optional
+        Covariance of the last state, where `first` is given the first measurements only: it tells what the others closed.
     """
     sigma = np.sqrt(np.diag(problem.covariance))
     if not (sigma > OPEN * np.maximum(np.abs(states[0]), 1.0)).any():  # a lower bound of the sizes, which are dearer
         return ""
     wide = sigma > OPEN * _sizes(problem, states)
-    if not wide.any() or not np.isfinite(first).all():
+    if not wide.any():
         return ""
-    unit = np.where(sigma > 0, sigma, 1.0)
-    values, vectors = np.linalg.eigh(first / np.outer(unit, unit))
-    direction = vectors[:, -1]
-    main = int(np.argmax(np.abs(direction)))
-    if not (values[-1] > UNTOUCHED and wide[main]):
+    direction = _open(first, sigma, wide)
+    if direction is None or (last is not None and _open(last, sigma, wide) is None):
         return ""
     return f"the measurements do not determine {_words(problem, direction)}: it is as uncertain as the prior left it"
+
+
+def _open(covariance: Array, sigma: Array, wide: Array) -> Array | None:
+    """The widest direction in units of the prior's sigma, None where the measurements said something about it."""
+    if not np.isfinite(covariance).all():
+        return None
+    unit = np.where(sigma > 0, sigma, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
+    direction: Array = vectors[:, -1]
+    return direction if values[-1] > UNTOUCHED and wide[np.argmax(np.abs(direction))] else None
 
 
 def _sizes(problem: Problem, states: Array) -> Array:

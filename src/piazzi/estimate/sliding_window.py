@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.considered import with_considered
+from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.live_window import LiveWindow, window_opens
 from piazzi.estimate.losses import loss_of
@@ -44,6 +45,9 @@ class SlidingWindow:
     One state and one iteration are the extended Kalman filter; all states, iterated, are the full graph.  With a loss, the
     rows of the newest epoch are at first weighted by their innovation nu^T S^-1 nu, later by their residual alone, like all
     others: while little is known, a large innovation says nothing against a row.
+
+    A direction that a wide prior left open, and that the measurements did not close, is named by the delayed estimate, which
+    then is no success, as by the full graph.
     """
 
     lag: int = 100
@@ -112,7 +116,8 @@ class SlidingWindow:
         if self.loss is not None:
             details |= {"loss": str(self.loss), "weights": row_weights(work, J)}
         steps = K * self.iterations
-        late = Estimate(problem, tracking, x, P_delayed, nu, S, steps, seconds, "delayed", None, details)
+        told = undetermined(problem, P_delayed[0], x, P[-1])
+        late = Estimate(problem, tracking, x, P_delayed, nu, S, steps, seconds, "delayed", None, details, told)
         return Estimate(problem, tracking, mean, P, nu, S, steps, seconds, "realtime", late, details)
 
     def start(self, problem: Problem) -> LiveWindow:

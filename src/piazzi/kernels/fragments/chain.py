@@ -75,6 +75,9 @@ def forward_following(a, W, x, scale, first_row, Q, Q_all, f, Phi, nu, H, m, P, 
         store(P_pred, j * N * N, P)
         first = (first_row[k] - base) * M
         d, P, P_old, C = follow_epoch(first, (first_row[k + 1] - base) * M, d, P, P_old, C, nu, H)
+        if j == 0:  # its own measurements in Joseph form: a wide prior less what they say would leave no digits
+            C = P
+            P_old = P
     return d, P, P_old
 
 

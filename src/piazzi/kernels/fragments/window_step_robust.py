@@ -132,6 +132,9 @@ def settle(
                 )
             first = (first_row[a + j] - base) * M
             d, P_new, P_old, C = follow_epoch(first, (first_row[a + j + 1] - base) * M, d, P_new, P_old, C, nu, H)
+            if j == 0:  # as in `forward_following`
+                C = P_new
+                P_old = P_new
         work[M * (M + N)] = kind
         backward(a, W, first_row, Phi, nu, H, 0.0, tether, d_pred, P_pred, gains, multiplier, dx)
         for j in range(W):
