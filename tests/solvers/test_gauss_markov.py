@@ -26,6 +26,13 @@ def test_the_model_says_what_was_added():
     assert dict(model.groups)["gauss_markov"] == ("gm_vx", "gm_vy")
 
 
+def test_units_are_those_of_rates():
+    """Written as everywhere: a power of seconds, never one division after the other."""
+    for unit, rate in {"m/s": "m/s^2", "m/s^2": "m/s^3", "1/s": "1/s^2", "m": "m/s", "rad": "rad/s", "": ""}.items():
+        model = pz.Model(["v"], ["0"], [pz.Sensor("s", ["v"])], units={"v": unit} if unit else {})
+        assert with_gauss_markov(model, ["v"]).unit("gm_v") == rate
+
+
 def test_rates_are_those_of_before_plus_the_disturbance():
     problem = disturbed()
     x = orbits.state(2, 0.1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -20,6 +21,12 @@ def driven_states(model: Model, states: str | Sequence[str]) -> tuple[str, ...]:
         if name not in model.states:
             raise ValueError(f"{name!r} is not a state{nearest(name, model.states)}")
     return tuple(states)
+
+
+def _per_second(unit: str) -> str:
+    """The unit of a rate: "m/s^2" of "m/s"."""
+    match = re.fullmatch(r"(.+)/s(?:\^(\d+))?", unit)
+    return f"{match[1]}/s^{int(match[2] or 1) + 1}" if match else f"{unit}/s"
 
 
 def with_gauss_markov(
@@ -53,7 +60,7 @@ def with_gauss_markov(
     rates |= {s: f"{rates[s]} + {a}" for s, a in zip(driven, new, strict=True)}
     rates |= {a: f"-{a}/{tau}" for a in new}
     added = isinstance(time_constant, str) and time_constant not in (*model.parameter_names, *model.states)
-    units = {a: f"{model.unit(s)}/s" for s, a in zip(driven, new, strict=True) if model.unit(s)}
+    units = {a: _per_second(model.unit(s)) for s, a in zip(driven, new, strict=True) if model.unit(s)}
     return replace(
         model,
         states=(*model.states, *new),
