@@ -282,6 +282,11 @@ def test_prior_after_the_first_measurement_is_refused():
         pz.ExtendedKalmanFilter().estimate(b612(prior_time=5.0), pz.Tracking([0.0, 1.0], [1.0, 1.0]))
 
 
+def test_prior_too_long_before_the_first_measurement_is_refused():
+    with pytest.raises(ValueError, match=r"the first measurement is at 1e\+308 s, too far after -1e\+308 s"):
+        pz.ExtendedKalmanFilter().estimate(b612(prior_time=-1e308), pz.Tracking([1e308], [1.0]))
+
+
 @given(st.lists(st.floats(1e-3, 1e5), min_size=1, max_size=20), st.floats(1e-2, 1e3))
 def test_no_substep_is_longer_than_asked(intervals, step):
     dt = np.array(intervals)

@@ -15,6 +15,10 @@ BAD = {
     "NaN time": (lambda: pz.Tracking([0, NAN], [1, 2]), "time of row 1 is nan; it must be finite"),
     "infinite time": (lambda: pz.Tracking([0, np.inf], [1, 2]), "time of row 1 is inf; it must be finite"),
     "time runs back": (lambda: pz.Tracking([0, 2, 1], [1, 2, 3]), "times must increase: row 2 is at 1 s, after 2 s"),
+    "a span that no number holds": (
+        lambda: pz.Tracking([-1e308, 0, 1e308], [1, 2, 3]),
+        r"row 2 is at 1e\+308 s, too far after -1e\+308 s: the interval is not finite",
+    ),
     "infinite measurement": (
         lambda: pz.Tracking([0, 1], [1, -np.inf]),
         r"measurement of row 1 \(t = 1 s\), component 0, is -inf; write NaN",

@@ -124,6 +124,8 @@ def test_a_good_file_has_no_faults(checked):
         ("count = 10", "stop = -1.0", "times.stop", "before the start"),
         ("count = 10", "count = 1000000000", "times", "at most"),
         ("step = 1.0\ncount = 10", "list = [0.0, 2.0, 1.0]", "times", "must increase"),
+        ("step = 1.0\ncount = 10", "list = [-1e308, 1e308]", "times", "time 1 is at 1e+308 s, too far after -1e+308 s"),
+        ("step = 1.0\ncount = 10", "start = 1e308\nstep = 1e308\ncount = 3", "times", "time 1 is inf s; it must be finite"),
         ("step = 1.0\ncount = 10", "list = []", "times.list", "is empty"),
         ("[times]", "[truth]\nstate = 'drown'\n[times]", "truth.state", "did you mean 'drawn'"),
         ("[times]", "[truth]\nparameters = { kk = 1 }\n[times]", "truth.parameters.kk", "did you mean 'k'"),

@@ -210,6 +210,7 @@ def test_refusals():
         ([], "there are no times to simulate"),
         ([0.0, np.nan], "time 1 is not finite"),
         ([0.0, 2.0, 1.0], "times must increase: time 2 is 1 s, after 2 s"),
+        ([-1e308, 1e308], r"time 1 is at 1e\+308 s, too far after -1e\+308 s"),
         ([0.0, 0.0], "times must increase: time 1 is 0 s, after 0 s"),
     ]:
         with pytest.raises(ValueError, match=match):

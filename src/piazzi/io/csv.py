@@ -15,7 +15,7 @@ from piazzi.io.atomic import atomic_path
 from piazzi.io.cells import STATION, Cells, read_cells
 from piazzi.model import nearest
 from piazzi.problem import Problem, Tracking
-from piazzi.problem.checks import Array
+from piazzi.problem.checks import Array, backwards, check_span
 from piazzi.scenarios.units import Units
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def _tracking(cells: Cells, problem: Problem) -> Tracking:
     station = _stations(cells, problem)
     values = _values(cells, problem, station)
     names: Any = None if cells.station is None else np.array(cells.station_names)[cells.station]
-    first = np.flatnonzero(np.diff(times, prepend=-np.inf) > 0)
+    first = np.flatnonzero(np.append(True, times[1:] > times[:-1]))
     states = problem.model.names
     known = TRUTH + states[0] in cells.numbers
     truth = np.column_stack([cells.numbers[TRUTH + s][first] for s in states]) if known else None
@@ -181,10 +181,10 @@ def _check_times(cells: Cells, times: Array) -> None:
     if bad.size:
         what = "is missing" if np.isnan(times[bad[0]]) else f"is {times[bad[0]]}"
         raise ValueError(f"line {cells.lines[bad[0]]}: the time {what}; it must be finite")
-    down = np.flatnonzero(np.diff(times) < 0)
-    if down.size:
-        i = int(down[0]) + 1
+    i = backwards(times)
+    if i is not None:
         raise ValueError(f"line {cells.lines[i]}: times must increase, but {times[i]:g} s comes after {times[i - 1]:g} s")
+    check_span(times[0], times[-1], f"line {cells.lines[-1]}")
 
 
 def _stations(cells: Cells, problem: Problem) -> Array:

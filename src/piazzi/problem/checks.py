@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import is_dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,18 @@ def numeric(value: Any, what: str) -> Array:
             return np.array(out, dtype=float)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what} is not made of real numbers: {error}") from None
+
+
+def backwards(times: Array) -> int | None:
+    """Index of the first time that is before the one before it, None where there is none."""
+    down = np.flatnonzero(times[1:] < times[:-1])  # a difference may overflow
+    return int(down[0]) + 1 if down.size else None
+
+
+def check_span(first: float, last: float, what: str) -> None:
+    """Raise ValueError where the seconds from the first of some times to the last are more than a number holds."""
+    if not isfinite(float(last) - float(first)):
+        raise ValueError(f"{what} is at {last:g} s, too far after {first:g} s: the interval is not finite")
 
 
 def finite_vector(value: Any, n: int, what: str, names: Sequence[str]) -> Array:

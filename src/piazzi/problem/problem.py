@@ -14,7 +14,7 @@ from piazzi.expressions.errors import suggest
 from piazzi.kernels import Discrete, Integrator, Kepler, KernelSpec, RungeKutta4
 from piazzi.model import Model, nearest
 from piazzi.problem import functions, manoeuvres
-from piazzi.problem.checks import Array, covariance, finite_vector, frozen, lock, numeric
+from piazzi.problem.checks import Array, check_span, covariance, finite_vector, frozen, lock, numeric
 from piazzi.problem.composition import composed
 from piazzi.problem.constants import with_station_constants
 from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
@@ -302,6 +302,7 @@ class Problem:
         start = float(times[0]) if self.prior_time is None else float(self.prior_time)
         if start > times[0]:
             raise ValueError(f"the prior is at {start:g} s, after the first measurement at {times[0]:g} s")
+        check_span(start, times[0], "the first measurement")
         if self.manoeuvres:
             manoeuvres.check_after(self.manoeuvres, start)
         dt = np.empty_like(times)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.problem.checks import Array, frozen, lock, numeric
+from piazzi.problem.checks import Array, backwards, check_span, frozen, lock, numeric
 
 if TYPE_CHECKING:
     from piazzi.problem.problem import Problem
@@ -77,10 +77,10 @@ class Tracking:
         if not np.isfinite(times).all():
             k = int(np.flatnonzero(~np.isfinite(times))[0])
             raise ValueError(f"time of row {k} is {times[k]}; it must be finite")
-        down = np.flatnonzero(np.diff(times) < 0)
-        if down.size:
-            k = int(down[0]) + 1
-            raise ValueError(f"times must increase: row {k} is at {times[k]:g} s, after {times[k - 1]:g} s")
+        down = backwards(times)
+        if down is not None:
+            raise ValueError(f"times must increase: row {down} is at {times[down]:g} s, after {times[down - 1]:g} s")
+        check_span(times[0], times[-1], f"row {len(times) - 1}")
         return frozen(times)
 
     def _checked_values(self) -> Array:

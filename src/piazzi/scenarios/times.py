@@ -6,7 +6,7 @@ from math import floor
 
 import numpy as np
 
-from piazzi.problem.checks import Array
+from piazzi.problem.checks import Array, check_span
 from piazzi.scenarios.faults import shown
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import Units
@@ -23,7 +23,7 @@ def read_times(table: Table, units: Units) -> Array | None:
             return None
         times = table.vector("list", [f"time {i}" for i in range(len(value))])
         table.finish()
-        return None if times is None else _increasing(table, times * units.time())
+        return None if times is None else _increasing(table, times, units)
     start = table.number("start")
     step = table.number("step", positive=True)
     count, stop = table.whole("count"), table.number("stop")
@@ -45,17 +45,30 @@ def read_times(table: Table, units: Units) -> Array | None:
     if count > MAX_EPOCHS:
         table.fault("", f"makes {count:g} epochs; at most {MAX_EPOCHS:g} are allowed")
         return None
-    return _increasing(table, (first + np.arange(count) * step) * units.time())
+    with np.errstate(over="ignore"):
+        return _increasing(table, first + np.arange(count) * step, units)
 
 
-def _increasing(table: Table, times: Array) -> Array | None:
+def _increasing(table: Table, times: Array, units: Units) -> Array | None:
+    """The times in seconds; None, with a fault noted, unless they increase and none is out of the range of numbers."""
     if not times.size:
         table.fault("list", "is empty")
         return None
-    wrong = np.flatnonzero(~(np.diff(times) > 0))
-    if wrong.size or not np.isfinite(times).all():
-        i = int(wrong[0]) + 1 if wrong.size else 0
+    with np.errstate(over="ignore"):
+        times = times * units.time()
+    lost = np.flatnonzero(~np.isfinite(times))
+    if lost.size:
+        table.fault("", f"time {lost[0]} is {times[lost[0]]:g} s; it must be finite")
+        return None
+    wrong = np.flatnonzero(~(times[1:] > times[:-1]))
+    if wrong.size:
+        i = int(wrong[0]) + 1
         table.fault("", f"must increase: time {i} is {times[i]:g} s, after {times[i - 1]:g} s")
+        return None
+    try:
+        check_span(times[0], times[-1], f"time {len(times) - 1}")
+    except ValueError as error:
+        table.fault("", str(error))
         return None
     times.setflags(write=False)
     return times

@@ -10,7 +10,7 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.problem import Gaussian, Problem, Tracking, Truth
-from piazzi.problem.checks import Array, finite_vector, numeric
+from piazzi.problem.checks import Array, check_span, finite_vector, numeric
 from piazzi.simulation.rule import MOST_DRAWS, NoTruthError, Rule
 
 __all__ = [
@@ -168,10 +168,11 @@ def check_times(times: Any) -> Array:
         raise ValueError("there are no times to simulate")
     if not np.isfinite(out).all():
         raise ValueError(f"time {int(np.argmin(np.isfinite(out)))} is not finite")
-    down = np.flatnonzero(np.diff(out) <= 0)
+    down = np.flatnonzero(out[1:] <= out[:-1])
     if down.size:
         k = int(down[0]) + 1
         raise ValueError(f"times must increase: time {k} is {out[k]:g} s, after {out[k - 1]:g} s")
+    check_span(out[0], out[-1], f"time {len(out) - 1}")
     return out
 
 
