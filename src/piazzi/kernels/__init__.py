@@ -1,6 +1,6 @@
 """Equations become compiled code."""
 
-from piazzi.kernels.cache import build_seconds, load
+from piazzi.kernels.cache import build_seconds, is_compiled, load
 from piazzi.kernels.integrators import Discrete, DormandPrince, Integrator, Kepler, Taylor
 from piazzi.kernels.library import Ready, ready
 from piazzi.kernels.runge_kutta import (
@@ -34,6 +34,7 @@ __all__ = [
     "RungeKutta8",
     "Taylor",
     "build_seconds",
+    "is_compiled",
     "load",
     "ready",
 ]

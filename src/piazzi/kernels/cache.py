@@ -28,12 +28,17 @@ _spent: list[float] = []
 _loaded: dict[tuple[KernelSpec, bool], SimpleNamespace] = {}
 
 
+def is_compiled() -> bool:
+    """Whether kernels run compiled: ``PIAZZI_JIT=0`` runs their source as it is."""
+    return bool(_environment.get(_JIT) != _OFF)
+
+
 def load(spec: KernelSpec) -> SimpleNamespace:
     """The callable entries of a specification, as attributes: from memory, from disk, or built now.
 
     A first build logs one line at level INFO on the logger ``piazzi.kernels``.
     """
-    compiled = _environment.get(_JIT) != _OFF
+    compiled = is_compiled()
     found = _loaded.get((spec, compiled))
     if found is None:
         started = time.perf_counter()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -106,7 +105,7 @@ def in_lanes(problem: Problem) -> bool:
 
 def lane_count() -> int:
     """Runs that advance together: eight, so that where registers hold four, one waits for its roots while another works."""
-    if os.environ.get("PIAZZI_JIT", "1") == "0":
+    if not kernels.is_compiled():
         return 1
     return max(machine_lanes(), 8) if machine_lanes() > 1 else 1
 
