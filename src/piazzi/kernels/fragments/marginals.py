@@ -10,17 +10,28 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
+def next_direction(rows, j, lanes):
+    """Row r_j of A = sum of r_j^T r_j, by Cholesky, in the place of row j of A; those before it are there already.
+
+    A direction in which A is zero to rounding gives a row of zeros.
+    """
+    whole = load_packs(rows, (j * N + j) * lanes, 1, lanes)[0]
+    row = load_packs(rows, j * N * lanes, N, lanes)
+    for k in range(j):
+        row = row - load_packs(rows, (k * N + j) * lanes, 1, lanes)[0] * load_packs(rows, k * N * lanes, N, lanes)
+    store_packs(rows, j * N * lanes, row, lanes)
+    pivot = load_packs(rows, (j * N + j) * lanes, 1, lanes)[0]
+    h = choose(pivot, 1e-15 * whole, 1.0 / sqrt(pivot), 0.0) * row
+    store_packs(rows, j * N * lanes, h, lanes)
+    return h
+
+
+@inline
 def directions(A, rows):
-    """Rows r_j with A = sum of r_j^T r_j, by Cholesky; a direction in which A is zero to rounding gives a row of zeros."""
+    """Rows r_j with A = sum of r_j^T r_j; see `next_direction`."""
     store(rows, 0, A)
     for j in range(N):
-        whole = rows[j * N + j]
-        row = load_vector(rows, j * N, N)
-        for k in range(j):
-            row = row - rows[k * N + j] * load_vector(rows, k * N, N)
-        store(rows, j * N, row)
-        pivot = rows[j * N + j]
-        store(rows, j * N, (1.0 / sqrt(pivot) if pivot > 1e-15 * whole else 0.0) * row)
+        next_direction(rows, j, 1)
 
 
 @inline
@@ -56,20 +67,13 @@ def inform(at, stride, own, covariance, rows):
     """Covariances of `LANES` states, at `at`, `at + stride`, ..., in the place of their information, in Joseph form.
 
     Each covariance given all measurements so far, in `own`, takes the information of later ones in as measurements of unit
-    noise: the rows of `directions`, one after the other as they become known.
+    noise: its directions, one after the other as they become known.
     """
     for i in range(N):
         store_packs(rows, i * N * LANES, load_lanes(covariance, at + i * N, N, stride, LANES), LANES)
     P = load_matrices(own, 0, N, N, stride, LANES)
     for j in range(N):
-        whole = load_packs(rows, (j * N + j) * LANES, 1, LANES)[0]
-        row = load_packs(rows, j * N * LANES, N, LANES)
-        for k in range(j):
-            row = row - load_packs(rows, (k * N + j) * LANES, 1, LANES)[0] * load_packs(rows, k * N * LANES, N, LANES)
-        store_packs(rows, j * N * LANES, row, LANES)
-        pivot = load_packs(rows, (j * N + j) * LANES, 1, LANES)[0]
-        h = choose(pivot, 1e-15 * whole, 1.0 / sqrt(pivot), 0.0) * row
-        store_packs(rows, j * N * LANES, h, LANES)
+        h = next_direction(rows, j, LANES)
         Ph = h @ P
         K = (1.0 / (h @ Ph + 1.0)) * Ph
         B = plus_outer(P, -Ph, K)
