@@ -60,7 +60,7 @@ def _piece(task: Task, found: list[tuple[Scored, list[str]]]) -> Piece:
         "diverged": np.stack([scored.diverged for scored, _ in found]).astype(np.uint8),
         "error": np.stack([scored.error for scored, _ in found]).astype(np.float32),
         "nees": np.stack([scored.nees for scored, _ in found]).astype(np.float32),
-        "rank": np.stack([scored.rank for scored, _ in found]).astype(np.uint8),
+        "rank": np.stack([scored.rank for scored, _ in found]).astype(np.uint16),
     }
     messages = [(row, task.first + i, text) for row, (_, texts) in enumerate(found) for i, text in enumerate(texts) if text]
     return Piece(task, arrays, tuple(messages))

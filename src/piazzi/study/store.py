@@ -209,7 +209,8 @@ def _create(file: Any, study: Study) -> None:
         _variable(file, name, per_run, "u1", (1, 1, together), 0)
     _variable(file, "error", (*per_run, "epoch", "group"), "f4", (1, 1, min(study.runs, 32), T, G), np.nan)
     _variable(file, "nees", (*per_run, "epoch"), "f4", (1, 1, min(study.runs, 64), T), np.nan)
-    _variable(file, "rank", (*per_run, "epoch"), "u1", (1, 1, min(study.runs, 64), T), 0)
+    rank = np.min_scalar_type(study.problem.model.n).str  # one byte, unless constants make more than 255 values
+    _variable(file, "rank", (*per_run, "epoch"), rank, (1, 1, min(study.runs, 64), T), 0)
     _variable(file, "bound", ("point", "view", "epoch", "group"), "f4", (1, 2, T, G), np.nan)
     for name in ("bound_whole", "bound_last_half"):
         _variable(file, name, ("point", "view", "group"), "f8", (1, 2, G), np.nan)
