@@ -86,6 +86,13 @@ def test_no_line_is_wider_than_the_terminal(call, monkeypatch, width):
     assert max(map(len, call("compare", SCENARIO, "--with", "ekf", "--with", "window:10").out.splitlines())) <= width
 
 
+@pytest.mark.parametrize("width", ["0", "", "wide", "\N{SUPERSCRIPT TWO}"])
+def test_a_width_that_is_none_does_not_count(call, monkeypatch, width):
+    """Some shells and editors say 0 where they do not know."""
+    monkeypatch.setenv("COLUMNS", width)
+    assert "position error of ekf is" in call("estimate", SCENARIO).out
+
+
 # ---- files ---------------------------------------------------------------------------------------------------------------
 
 

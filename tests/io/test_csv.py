@@ -158,6 +158,8 @@ def test_every_double_survives(tmp_path):
         ("time,time,range\n0,0,1\n", "line 1: two columns are called 'time'"),
         ("time,,range\n0,0,1\n", "line 1: column 2 has no name"),
         ("time [parsec],station,range\n0,west,1\n", "unknown unit 'parsec'"),
+        ("time [m],station,range\n0,west,1\n", "column 'time [m]' has no unit of its kind: 'time' is in s"),
+        ("time,station,bearing [km]\n0,north,1\n", "column 'bearing [km]' has no unit of its kind: 'bearing' is in rad"),
         ("time,station,range\n0,west,1\n1,west\n", "line 3 has 2 cells; the header names 3 (time, station, range)"),
         ("time,station,range\n0,west,1,2\n", "line 2 has 4 cells"),
         ("time,station,range\n0,west,1\n\n1,west,abc\n", "line 4: range is 'abc'; it must be a number"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -38,7 +39,9 @@ def print_rich(*parts: Any) -> None:
             raise BrokenPipeError
 
     stream = _stdout()
-    width = None if stream.isatty() or os.environ.get("COLUMNS", "").isdigit() else _UNLIMITED
+    given = os.environ.get("COLUMNS", "")
+    columns = int(given) if given.isdecimal() and given.isascii() else 0  # some shells and editors set 0 where they do not know
+    width = columns or (shutil.get_terminal_size().columns if stream.isatty() else _UNLIMITED)
     console = Plain(file=stream, width=width, highlight=False, emoji=False, markup=False)
     for part in parts:
         console.print(printable(part) if isinstance(part, str) else part, soft_wrap=isinstance(part, str))

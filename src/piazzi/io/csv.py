@@ -6,6 +6,8 @@ import csv
 import os
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from fractions import Fraction
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +34,7 @@ def read_csv(path: str | os.PathLike[str], problem: Problem) -> Tracking:
 
     The first line names the columns: ``time``, ``station`` (not needed where there is one), the components of the sensors,
     and, where the truth is known, ``truth:`` and a state.  Empty cells are missing values.  Numbers are in SI and radians,
-    or in the unit that a column names, as in ``bearing [deg]``.
+    or in the unit that a column names, as in ``bearing [deg]``, which must be of the column's kind.
 
     Raises
     ------
@@ -120,12 +122,12 @@ def _components(problem: Problem, station: Array, values: Array) -> dict[str, Ar
     return out
 
 
-def _in_si(cells: Cells) -> Cells:
+def _in_si(cells: Cells, problem: Problem) -> Cells:
     """The same table with the units of its column names taken into account."""
     numbers: dict[str, Array] = {}
     for name, column in cells.numbers.items():
         match = _UNIT.fullmatch(name)
-        label, factor = (match[1], Units().unit(match[2]).factor) if match else (name, 1.0)
+        label, factor = (match[1], _factor(name, match[1], match[2], problem)) if match else (name, 1.0)
         if label in numbers:
             raise ValueError(f"two columns are called {label!r}")
         with np.errstate(over="ignore"):
@@ -133,9 +135,33 @@ def _in_si(cells: Cells) -> Cells:
     return Cells(cells.comments, numbers, cells.station, cells.station_names, cells.lines)
 
 
+def _factor(column: str, label: str, text: str, problem: Problem) -> float:
+    """What turns numbers in the unit `text` into SI; raises ValueError where what is called `label` has no such unit."""
+    unit = Units().unit(text)
+    own = _own_units(label, problem)
+    if own and unit.powers not in own.values():
+        raise ValueError(f"column {column[:60]!r} has no unit of its kind: {label!r} is in {', '.join(sorted(own))}")
+    return unit.factor
+
+
+def _own_units(label: str, problem: Problem) -> dict[str, tuple[Fraction, ...]]:
+    """The SI units of what is in a column, with their exponents; none where a model made in Python names none that is known."""
+    sensors = [problem.model.sensor(s.sensor) for s in problem.stations]
+    names = {dict(sensor.units).get(label, "") for sensor in sensors}
+    if label == TIME:
+        names = {"s"}
+    elif label.startswith(TRUTH):
+        names = {problem.model.unit(label.removeprefix(TRUTH))}
+    out: dict[str, tuple[Fraction, ...]] = {}
+    for name in names:
+        with suppress(ValueError):
+            out[name] = Units().unit(name).powers
+    return out
+
+
 def cells_to_tracking(cells: Cells, problem: Problem) -> Tracking:
     """The measurements in a table; raises ValueError for columns, stations or cells that do not fit the problem."""
-    return _tracking(_in_si(cells), problem)
+    return _tracking(_in_si(cells, problem), problem)
 
 
 def _tracking(cells: Cells, problem: Problem) -> Tracking:
