@@ -13,6 +13,7 @@ from piazzi.problem.checks import Array
 TOO_WIDE = "the prior is too wide for covariances"
 FIRST_DAMPING, LARGEST_DAMPING = 1e-4, 1e12
 NEARLY, ROUGHLY = 1e-3, 10.0  # steps below so much of a sigma may be rounding, within so many times its estimate
+SHRINKING = 0.05  # of the step before, or less: what a step near a solution is, unless it is rounding or converges slowly
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +31,8 @@ def optimize(
 ) -> Outcome:
     """Iterate from the states `start` until no state and no measurement moves by more than `tolerance` standard deviations.
 
-    Measurements count too because a combination of states can be known much better than each of them.  Small steps that no
-    longer shrink and are no larger than what rounding of the states makes of them end the iterations as well.
+    Measurements count too because a combination of states can be known much better than each of them.  Small steps that do
+    not shrink much and are no larger than what rounding of the states makes of them end the iterations as well.
     A step that raises the merit is damped as much as it takes (Levenberg-Marquardt, scaled by the prior), except the first.
     The merit is the cost, and for directions without noise, where the dynamics must hold, twice the defect at the price of
     its multiplier (an exact penalty: Nocedal and Wright 2006, eq. 15.24).  Ends at once, with the failure `TOO_WIDE`, where
@@ -48,7 +49,7 @@ def optimize(
         if iteration == 1 and widest < solver.widest() < np.inf:
             return Outcome(chain.P_pred, iteration, TOO_WIDE, _figures(chain, solver, costs))
         size = _size(chain)
-        stuck = damping == 0.0 and NEARLY > size > max(0.5 * before, tolerance) and not chain.reweighted
+        stuck = damping == 0.0 and NEARLY > size > max(SHRINKING * before, tolerance) and not chain.reweighted
         at_rounding = stuck and size <= ROUGHLY * _rounding(chain, solver)
         if damping == 0.0 and np.isfinite(cost) and (size <= tolerance or at_rounding):
             covariance = solver.marginals()
