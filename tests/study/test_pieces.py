@@ -170,3 +170,17 @@ def test_considered_parameters_count_in_a_study_too():
     study = Study(problem, np.arange(10) * 0.3, ["ekf"], 3)
     task = Task(0, 0, 3)
     assert_equals_compare(study, run_task(study, task), simulated(study, task))
+
+
+@pytest.mark.slow
+def test_ranks_beyond_a_byte_are_kept(tmp_path, monkeypatch):
+    """One state and 299 constants."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    names = [f"c{i}" for i in range(299)]
+    model = pz.Model(["x"], ["0"], [pz.Sensor("level", ["+".join(["x", *names])])], parameters=[pz.Parameter(c, role="estimated") for c in names])
+    constants = dict.fromkeys(names, pz.Gaussian(0.0, 1.0))
+    problem = pz.Problem(model, pz.Gaussian(0.0, 1.0), None, [pz.Station("a", "level", 1.0)], constants)
+    stored = Study(problem, np.arange(3.0), ["ekf"], 2).run(tmp_path / "s.nc", workers=0)
+    row = stored.row(0, 0)
+    assert row.success.all()
+    assert (row.rank == 300).all()
