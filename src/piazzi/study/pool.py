@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import struct
 import subprocess
 import sys
@@ -121,6 +122,8 @@ class Processes:
         return [p.pid for p in self._processes.values() if p.poll() is None]
 
     def _serve(self, index: int) -> None:
+        if hasattr(signal, "pthread_sigmask"):  # which what it starts inherits: Ctrl-C, however early, is not for workers
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         process: subprocess.Popen[bytes] | None = None
         with suppress(OSError):  # told with the first task
             process = self._processes[index] = self._start()
@@ -200,8 +203,6 @@ def how_it_ended(status: int) -> str:
     """An exit status in words."""
     if status >= 0:
         return f"exit status {status}"
-    import signal
-
     with suppress(ValueError):
         return signal.Signals(-status).name
     return f"signal {-status}"
