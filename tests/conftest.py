@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -15,8 +15,9 @@ CACHE.mkdir(mode=0o700, parents=True, exist_ok=True)
 os.environ["PIAZZI_CACHE"] = str(CACHE)
 os.environ["MPLBACKEND"] = "Agg"
 
-# No deadline: a first call may compile.  In CI the same commit draws the same examples.
-settings.register_profile("piazzi", deadline=None, derandomize="CI" in os.environ)
+# Neither a deadline nor a limit for drawing: a first call may compile, on a busy machine.  In CI the same commit draws the
+# same examples.
+settings.register_profile("piazzi", deadline=None, derandomize="CI" in os.environ, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("piazzi")
 
 

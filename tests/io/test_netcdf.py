@@ -17,7 +17,7 @@ from piazzi.io import load_estimate, save, save_estimate
 from piazzi.io.netcdf import read_estimate, read_netcdf, write_estimate, write_netcdf
 from tests.references.drawn import TEXT, problems, same_bits, same_problem, same_tracking, trackings
 
-QUIET = settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+QUIET = settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 ARRAYS = ("mean", "covariance", "innovations", "innovation_covariances")
 
 
