@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
+from tests.waiting import HANGS
 
 EXAMPLES = sorted((Path(__file__).resolve().parent.parent / "examples").glob("*.toml"))
 PIAZZI = str(Path(sys.executable).with_name("piazzi"))
@@ -23,7 +24,7 @@ SLOW = {"ground_stations": pytest.mark.slow}  # 18 values take a minute to compi
 
 @pytest.mark.parametrize("path", [pytest.param(p, id=p.stem, marks=SLOW.get(p.stem, ())) for p in EXAMPLES])
 def test_an_example_is_sound_and_its_graph_knows_its_errors(path):
-    checked = subprocess.run([PIAZZI, "scenarios", "check", str(path)], capture_output=True, text=True, timeout=60)
+    checked = subprocess.run([PIAZZI, "scenarios", "check", str(path)], capture_output=True, text=True, timeout=HANGS)
     assert checked.returncode == 0, checked.stderr
     problem, tracking = pz.load(path)
     estimate = pz.FactorGraph().estimate(problem, tracking)
@@ -37,7 +38,7 @@ def test_a_newcomers_problem_is_pictured(tmp_path):
     """As its writer would: one command, and a page that shows what was measured and how far off the estimate is."""
     path, page = next(p for p in EXAMPLES if p.stem == "falling_probe"), tmp_path / "page.html"
     made = subprocess.run(
-        [PIAZZI, "report", str(path), "--with", "graph", "-o", str(page)], capture_output=True, text=True, timeout=300
+        [PIAZZI, "report", str(path), "--with", "graph", "-o", str(page)], capture_output=True, text=True, timeout=HANGS
     )
     assert made.returncode == 0, made.stderr
     text = page.read_text()
@@ -52,7 +53,7 @@ def test_the_founding_papers_figures(data_dir, tmp_path):
     script = Path(__file__).resolve().parent.parent / "examples" / "founding_figures.py"
     made = subprocess.run(
         [sys.executable, "-W", "error", str(script), str(folder), "-o", str(tmp_path), "--format", "svg"],
-        capture_output=True, text=True, timeout=300,
+        capture_output=True, text=True, timeout=HANGS,
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["accuracy_ekf.svg", "accuracy_graph.svg", "timing.svg"]

@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from piazzi.expressions import CONSTANTS, FUNCTIONS, ExpressionError, check, from_sympy, is_name, names, symbol, to_sympy
+from tests.waiting import HANGS
 
 STATES = ("x", "y", "vx", "vy", "mu", "r", "t")
 SYMBOLS = {name: symbol(name) for name in STATES}
@@ -298,13 +299,13 @@ sys.addaudithook(canary)
 
 def refusal(action, text: str) -> ExpressionError:
     """The error of an action that must refuse the text, quickly and without running, importing or opening anything."""
-    ear.events, start, error = [], time.perf_counter(), None
+    ear.events, start, error = [], time.process_time(), None
     try:
         accepted = action(text)
     except ExpressionError as refused:
         error = refused
     finally:
-        seconds, events, ear.events = time.perf_counter() - start, ear.events, None
+        seconds, events, ear.events = time.process_time() - start, ear.events, None
     assert error is not None, f"accepted as {accepted!r}"
     assert not events
     assert seconds < 5.0
@@ -342,10 +343,10 @@ def test_there_are_enough_hostile_texts():
 @pytest.mark.parametrize("text", HIDDEN)
 def test_what_cancels_to_nonsense_is_refused_before_sympy_works_it_out(text):
     check(text, STATES)
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(ExpressionError, match=r"^column \d+ of ") as caught:
         to_sympy(text, SYMBOLS)
-    assert time.perf_counter() - start < 20.0
+    assert time.process_time() - start < 20.0
     assert str(caught.value).isprintable()
 
 
@@ -437,7 +438,7 @@ def has_call(text: str) -> bool:
     return any(isinstance(node, ast.Call | ast.Tuple) for node in ast.walk(ast.parse(text, mode="eval")))
 
 
-@settings(max_examples=500, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=500, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(st.lists(st.sampled_from(TOKENS), min_size=1, max_size=12).map(" ".join))
 def test_the_grammar_is_pythons(text):
     try:
@@ -769,7 +770,7 @@ def run(program: str, **environment: str) -> str:
     import os
 
     result = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, env=os.environ | environment, check=True
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=HANGS, env=os.environ | environment, check=True
     )
     return result.stdout
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from piazzi.cli.main import main
+from tests.waiting import HANGS
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def program() -> Call:
         command = [sys.executable, "-m", "piazzi", *map(str, arguments)]
         if "input" not in options:
             options.setdefault("stdin", subprocess.DEVNULL)
-        done = subprocess.run(command, capture_output=True, check=False, timeout=300, **options)
+        done = subprocess.run(command, capture_output=True, check=False, timeout=HANGS, **options)
         return Result(done.returncode, done.stdout.decode(), done.stderr.decode())
 
     return program

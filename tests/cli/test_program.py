@@ -1,15 +1,17 @@
 """The command line as a program: streams, pipes, signals, imports, and files from somewhere else."""
 
+import fcntl
 import os
 import signal
 import subprocess
 import sys
-import time
+import termios
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
+
+from tests.waiting import HANGS, until
 
 SCENARIO = "b612-range"
 PIAZZI = [sys.executable, "-m", "piazzi"]
@@ -65,12 +67,14 @@ def test_stdin_that_holds_nothing_useful_is_refused(program, data):
     "arguments", [["estimate", SCENARIO], ["estimate", SCENARIO, "--json"], ["--help"], ["simulate", SCENARIO, "-o", "-"]]
 )
 def test_a_closed_pipe_ends_quietly(arguments):
-    process = subprocess.Popen([*PIAZZI, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    process.stdout.close()
-    error = process.stderr.read().decode()
-    process.stderr.close()
-    assert process.wait(timeout=60) == 141
-    assert [line for line in error.splitlines() if "compiling" not in line] == []
+    reader, writer = os.pipe()
+    os.close(reader)  # before anything can be written, however long the start takes
+    try:
+        done = subprocess.run([*PIAZZI, *arguments], stdout=writer, stderr=subprocess.PIPE, text=True, timeout=HANGS)
+    finally:
+        os.close(writer)
+    assert done.returncode == 141
+    assert [line for line in done.stderr.splitlines() if "compiling" not in line] == []
 
 
 def test_a_full_device_is_said(program):
@@ -83,30 +87,49 @@ def test_a_full_device_is_said(program):
     assert "Traceback" not in done.stderr
 
 
-def processor_seconds(pid):
-    """Processor time of a process so far; a second where the system does not tell."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return 1.0
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+INTERRUPTING = """
+import os, signal, sys
+from piazzi.cli.main import main
+moment, *arguments = sys.argv[1:]
+
+class Interrupt:
+    def find_spec(name, path=None, target=None):
+        if name == moment:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupt)
+sys.exit(main(arguments))
+"""
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.4])
-def test_ctrl_c_ends_at_once(delay):
+@pytest.mark.parametrize("moment", ["piazzi.cli.commands", "piazzi.cli.estimate", "numpy", "piazzi.loading"])
+def test_ctrl_c_while_it_starts_ends_at_once(moment):
+    """At an import: the first of all, that of the command, a heavy one, and one that the command makes when it runs."""
+    command = [sys.executable, "-c", INTERRUPTING, moment, "estimate", "-"]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=HANGS)
+    assert done.returncode == 130
+    assert done.stdout == ""
+    assert done.stderr.split() == ["piazzi:", "interrupted"]
+
+
+def test_ctrl_c_while_it_waits_ends_at_once():
+    """What was written into its input is gone from the pipe: it reads, and there is no more to read."""
     process = subprocess.Popen(
         [*PIAZZI, "estimate", "-"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
-    for _ in range(200):  # past the interpreter's own start, however long that takes on a busy machine
-        if processor_seconds(process.pid) > 0.06:
-            break
-        time.sleep(0.05)
-    time.sleep(delay)
+    process.stdin.write(b"time")
+    process.stdin.flush()
+    until(lambda: unread(process.stdin) == 0, process)
     process.send_signal(signal.SIGINT)
-    out, error = process.communicate(timeout=30)
-    assert process.returncode == 130
+    assert process.wait(HANGS) == 130  # with its input still open
+    out, error = process.communicate()
     assert out == b""
     assert error.decode().split() == ["piazzi:", "interrupted"]
+
+
+def unread(pipe):
+    """Bytes that a pipe holds."""
+    return int.from_bytes(fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)), sys.byteorder)
 
 
 def test_debug_shows_where(program):

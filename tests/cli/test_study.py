@@ -6,9 +6,10 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
+
+from tests.waiting import HANGS, until
 
 FAST = ["--runs", 6, "--workers", 0]
 
@@ -168,12 +169,9 @@ def test_interrupt_leaves_a_store_that_goes_on(tmp_path):
         start_new_session=True,
     )
     beside = tmp_path / "s.nc.runs"
-    for _ in range(1200):
-        if beside.exists() and beside.stat().st_size > 100_000:
-            break
-        time.sleep(0.05)
+    until(lambda: beside.exists() and beside.stat().st_size > 100_000, process)
     os.killpg(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=HANGS)
     assert process.returncode == 130
     assert out == ""
     lines = [line for line in err.splitlines() if line and "compiling" not in line]
@@ -187,14 +185,16 @@ def test_interrupt_leaves_a_store_that_goes_on(tmp_path):
 @pytest.mark.skipif(not hasattr(resource, "RLIMIT_FSIZE"), reason="no limits of file sizes here")
 def test_a_file_that_cannot_grow_ends_with_a_clear_error_and_goes_on(tmp_path):
     """The limit of the size of files stands for a full disk: writes fail in the middle of a record."""
-    command = [sys.executable, "-m", "piazzi", "study", "b612-range", "--runs", "600", "--with", "ekf", "--workers", "0"]
-
-    def limited():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, resource.RLIM_INFINITY))
-
-    options = {"capture_output": True, "text": True, "check": False, "timeout": 300}
-    first = subprocess.run([*command, "-o", tmp_path / "s.nc"], preexec_fn=limited, **options)
+    study = ["study", "b612-range", "--runs", "600", "--with", "ekf", "--workers", "0"]
+    command = [sys.executable, "-m", "piazzi", *study]
+    limited = (
+        "import resource, signal, sys; from piazzi.cli.main import main\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, resource.RLIM_INFINITY))\n"
+        "sys.exit(main(sys.argv[1:]))"
+    )
+    options = {"capture_output": True, "text": True, "check": False, "timeout": HANGS}
+    first = subprocess.run([sys.executable, "-c", limited, *study, "-o", tmp_path / "s.nc"], **options)
     assert first.returncode == 2
     assert "File too large" in first.stderr.splitlines()[-1]
     assert "Traceback" not in first.stderr

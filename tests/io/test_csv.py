@@ -1,5 +1,7 @@
 """Comma-separated measurements: exact both ways, the same quickly as with care, and every fault with its line."""
 
+import time
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -11,7 +13,7 @@ from piazzi.io import cells, save
 from piazzi.io.csv import read_csv, write_csv
 from tests.references.drawn import FLOATS, TEXT, problems, same_bits, same_tracking, trackings
 
-QUIET = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+QUIET = settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 MODEL = pz.Model(
     ["x", "v"],
     ["v", "0"],
@@ -205,16 +207,29 @@ def test_a_component_called_like_another_column_is_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_million_measurements_load_in_two_seconds(tmp_path):
-    import time
-
+def test_a_million_measurements_load_much_faster_than_their_numbers_one_by_one(tmp_path):
+    """In two seconds of 3.3, where this was written; best of two, in turns, since others may keep the processor busy."""
     J = 10**6
     rng = np.random.default_rng(0)
     tracking = pz.Tracking(np.arange(J) * 0.1, rng.normal(size=(J, 2)), np.tile(["west"], J))
-    write_csv(tmp_path / "a.csv", PROBLEM, tracking)
+    path = tmp_path / "a.csv"
+    write_csv(path, PROBLEM, tracking)
     import pandas  # noqa: F401
 
+    def one_by_one():
+        with path.open() as lines:
+            next(lines)
+            for line in lines:
+                time, _, *values = line.split(",")
+                [float(v) for v in (time, *values) if v != "\n"]
+
+    rounds = [(processor_seconds(lambda: read_csv(path, PROBLEM)), processor_seconds(one_by_one)) for _ in range(2)]
+    loading, reading = (min(seconds) for seconds in zip(*rounds, strict=True))
+    assert loading < 0.6 * reading
+    assert same_tracking(read_csv(path, PROBLEM), tracking)
+
+
+def processor_seconds(work):
     started = time.process_time()
-    again = read_csv(tmp_path / "a.csv", PROBLEM)
-    assert time.process_time() - started < 2.0
-    assert same_tracking(again, tracking)
+    work()
+    return time.process_time() - started

@@ -66,7 +66,7 @@ def test_keys_may_be_bare_numbers_or_arrays_of_one(tmp_path):
     assert tracking.times[1] == 3.0
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(st.data())
 def test_round_trip_is_exact(tmp_path, data):
     K = data.draw(st.integers(1, 30))
@@ -223,13 +223,20 @@ def test_a_bomb_is_refused_before_it_is_read(tmp_path):
             member.write(zeros.getvalue())
             for _ in range(64):
                 member.write(bytes(2**24))
+    started = time.process_time()
+    with zipfile.ZipFile(tmp_path / "a.npz") as archive, archive.open("meas.npy") as member:
+        while member.read(2**24):
+            pass
+    reading = time.process_time() - started
     tracemalloc.start()
-    started = time.perf_counter()
-    with pytest.raises(ValueError, match="absurd"):
-        pz.load(tmp_path / "a.npz")
-    assert time.perf_counter() - started < 2
-    assert tracemalloc.get_traced_memory()[1] < 2**24
-    tracemalloc.stop()
+    started = time.process_time()
+    try:
+        with pytest.raises(ValueError, match="absurd"):
+            pz.load(tmp_path / "a.npz")
+        assert time.process_time() - started < reading / 2
+        assert tracemalloc.get_traced_memory()[1] < 2**24
+    finally:
+        tracemalloc.stop()
 
 
 def test_honest_compression_is_read(tmp_path):
@@ -237,7 +244,7 @@ def test_honest_compression_is_read(tmp_path):
     assert same_tracking(pz.load(tmp_path / "a.npz")[1], pz.load(put(tmp_path / "b.npz"))[1])
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(st.data())
 def test_damaged_bytes_are_read_or_told(tmp_path, data):
     content = bytearray(put(tmp_path / "whole.npz").read_bytes())

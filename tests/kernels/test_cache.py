@@ -16,6 +16,7 @@ import pytest
 import piazzi
 import piazzi as pz
 from piazzi.kernels import KernelSpec, cache, folder, spec
+from tests.waiting import HANGS
 
 PACKAGE = Path(piazzi.__file__).parent
 MODEL = pz.Model(["x"], ["-k*x"], parameters=["k"])
@@ -375,7 +376,7 @@ def start(code: str, env: dict[str, str], **options) -> subprocess.Popen:
 
 
 def finished(process: subprocess.Popen) -> str:
-    out, err = process.communicate(timeout=300)
+    out, err = process.communicate(timeout=HANGS)
     assert process.returncode == 0, err
     assert "Traceback" not in err
     return out
@@ -405,7 +406,7 @@ def test_machine_without_a_writable_home(tmp_path):
     blocked.write_text("a file, so that no folder can be made in it")
     env = {k: v for k, v in os.environ.items() if k not in ("PIAZZI_CACHE", "XDG_CACHE_HOME")} | {"HOME": str(blocked)}
     process = start(RATES, env)
-    out, err = process.communicate(timeout=300)
+    out, err = process.communicate(timeout=HANGS)
     assert process.returncode == 0, err
     assert out.split()[0] == "-1.0"
     assert err.count("UserWarning") == 1

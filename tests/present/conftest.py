@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from tests.waiting import HANGS
+
 CHROMIUM = Path(os.environ.get("PIAZZI_CHROMIUM") or "/usr/bin/chromium")
 FLAGS = [
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -33,7 +35,7 @@ def browser() -> Iterator[Any]:
     except ImportError:
         absent("playwright is not installed: it is in the extra dev")
     with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=str(CHROMIUM), headless=True, args=FLAGS)
+        found = playwright.chromium.launch(executable_path=str(CHROMIUM), headless=True, args=FLAGS, timeout=1000 * HANGS)
         yield found
         found.close()
 
@@ -47,7 +49,7 @@ def open_page(browser) -> Iterator[OpenPage]:
         context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
         contexts.append(context)
         page = context.new_page()
-        page.set_default_timeout(10_000)
+        page.set_default_timeout(1000 * HANGS)
         page.on("console", lambda message: faults.append(message.text))
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.on("dialog", lambda dialog: (faults.append(f"dialog: {dialog.message}"), dialog.dismiss()))

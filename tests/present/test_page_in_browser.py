@@ -74,16 +74,20 @@ def test_the_slider_moves_every_cursor_and_the_orbit(open_page, report):
 
 
 def test_it_plays_and_pauses(open_page, report):
+    """By a clock that stands still but for the seconds given here, of the twenty that it plays."""
     page = open_page(report)
-    button = page.locator("#t0 .play")
+    page.clock.install(time=0)
+    page.clock.pause_at(1000)
+    button, place = page.locator("#t0 .play"), page.locator("#t0 input.time")
     button.click()
     assert button.inner_text() == "Pause"
-    page.wait_for_function("() => document.querySelector('#t0 input.time').value > 0")
+    page.clock.run_for(5000)
+    stopped = place.input_value()
+    assert 20 <= int(stopped) <= 25  # of 99
     button.click()
     assert button.inner_text() == "Play"
-    stopped = page.locator("#t0 input.time").input_value()
-    page.wait_for_timeout(100)
-    assert page.locator("#t0 input.time").input_value() == stopped
+    page.clock.run_for(5000)
+    assert place.input_value() == stopped
 
 
 def test_the_legend_switches_an_estimator_everywhere(open_page, report):
@@ -203,12 +207,17 @@ OVERLAPS = """() => {
 }"""
 
 
+def drawn(page) -> None:
+    """Wait until a page that has changed is drawn: what watches the sizes of its parts is told between frames."""
+    page.evaluate("async () => { for (let i = 0; i < 3; i++) await new Promise(requestAnimationFrame); }")
+
+
 @pytest.mark.parametrize("width", [360, 700, 1280])
 def test_no_text_overlaps_and_nothing_scrolls_sideways(open_page, report, width):
     page = open_page(report, width=width)
     for tab in ("#tab-t0", "#tab-t1"):
         page.locator(tab).click()
-        page.wait_for_timeout(100)
+        drawn(page)
         assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
         assert page.evaluate(OVERLAPS) == []
 
@@ -220,7 +229,7 @@ def test_windows_and_observability_have_pages_too(open_page, comparison, tmp_pat
     page = open_page(write_page(tmp_path, "Report", tabs), width=width)
     for n, charts in ((0, 5), (1, 2)):
         page.locator(f"#tab-t{n}").click()
-        page.wait_for_timeout(100)
+        drawn(page)
         assert page.locator(f"#t{n} .plot svg").count() == charts
         assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
         assert page.evaluate(OVERLAPS) == []
