@@ -15,6 +15,10 @@ CACHE.mkdir(mode=0o700, parents=True, exist_ok=True)
 os.environ["PIAZZI_CACHE"] = str(CACHE)
 os.environ["MPLBACKEND"] = "Agg"
 
+# Tests that are about these set them; where the caller has set them, tables would be cut and coloured, and errors longer.
+for name in ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "PIAZZI_DEBUG", "PYTHONIOENCODING"):
+    os.environ.pop(name, None)
+
 # Neither a deadline nor a limit for drawing: a first call may compile, on a busy machine.  In CI the same commit draws the
 # same examples.
 settings.register_profile("piazzi", deadline=None, derandomize="CI" in os.environ, suppress_health_check=[HealthCheck.too_slow])
