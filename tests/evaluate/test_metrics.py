@@ -161,6 +161,7 @@ RAMP = np.repeat(np.linspace(0, 1, K)[:, None], 2, axis=1)
         (1000 * RAMP**2, 1.0, True),  # growing without knowing it
         (1000 * RAMP**2, 1000.0, False),  # growing and knowing it
         (1e5 * np.exp(-12 * RAMP), 1.0, False),  # still beyond its covariance in the last half, but coming down
+        (np.where(RAMP == 0, 1.0, 1e6 * np.exp(-9 * RAMP)), 1.0, True),  # coming down, but further off than where it began
         (np.where(RAMP > 0.9, np.nan, NOISE), 1.0, True),  # not finite
         (np.where(RAMP < 0.4, 500 * NOISE, NOISE), 1.0, False),  # lost at first, found again
     ],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -198,9 +199,10 @@ def has_diverged(estimate: Estimate) -> bool:
     * its own covariance denies the error: the median NEES is beyond ten times the 99.9 % quantile of chi-square, far outside
       what correlation in time or a mild nonlinearity explains;
     * the error is not coming down: in no group of states is the RMS error of the last quarter less than half of that of the
-      quarter before.
+      quarter before, and less than the error at the first epoch.
 
-    Without truth, NIS and the innovations take the place of NEES and the errors.  Both kinds of divergence in Fitzgerald, IEEE
+    Without truth, NIS and the innovations take the place of NEES and the errors, the first epoch aside: one innovation is
+    mostly noise.  Both kinds of divergence in Fitzgerald, IEEE
     Trans. Automatic Control 16(6), 1971, are meant: errors that grow, and errors that stay far beyond their covariance.
     """
     return diverged(estimate, errors(estimate), nees(estimate))
@@ -211,8 +213,9 @@ def diverged(estimate: Estimate, error: Array | None, consistency: Consistency |
     if not np.isfinite(estimate.mean).all():
         return True
     if error is not None and consistency is not None:
-        return _denied(consistency) and _persists(error, list(groups(estimate).values()))
-    return _denied(nis(estimate)) and _persists(estimate.innovations, [(i,) for i in range(estimate.innovations.shape[1])])
+        return _denied(consistency) and _persists(error, list(groups(estimate).values()), from_first=True)
+    columns = [(i,) for i in range(estimate.innovations.shape[1])]
+    return _denied(nis(estimate)) and _persists(estimate.innovations, columns, from_first=False)
 
 
 def groups(estimate: Estimate) -> dict[str, tuple[int, ...]]:
@@ -230,15 +233,21 @@ def _denied(consistency: Consistency) -> bool:
     return bool(np.median(consistency.value[half][known]) > FAR * quantile(0.999, float(typical)))
 
 
-def _persists(error: Array, columns: Sequence[Sequence[int]]) -> bool:
-    """Whether in no group of columns the last quarter is less than half of the quarter before; False for a run too short."""
+def stays(first: Any, earlier: Any, later: Any) -> Any:
+    """Whether an error does not come down, by its sizes at the first epoch and in the last two quarters: numbers or arrays."""
+    return (later >= 0.5 * earlier) | (later > first)
+
+
+def _persists(error: Array, columns: Sequence[Sequence[int]], from_first: bool) -> bool:
+    """Whether the error of every group of columns stays; False for a run too short."""
     K = len(error)
-    sizes, known = [], ~np.isnan(error)
+    found, known = [], ~np.isnan(error)
+    quarters = slice(0, 1), slice(K // 2, 3 * K // 4), slice(3 * K // 4, None)
     for group in columns:
-        earlier, later = (rmse(error, group, rows, known) for rows in (slice(K // 2, 3 * K // 4), slice(3 * K // 4, None)))
+        first, earlier, later = (rmse(error, group, rows, known) for rows in quarters)
         if earlier is not None and later is not None:
-            sizes.append((earlier, later))
-    return bool(sizes) and all(later >= 0.5 * earlier for earlier, later in sizes)
+            found.append(stays(first if from_first and first is not None else np.inf, earlier, later))
+    return bool(found) and all(found)
 
 
 def residual_rms(estimate: Estimate) -> dict[str, float]:

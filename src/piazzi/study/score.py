@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.estimate import Estimate
 from piazzi.estimate.chi_square import quantile
-from piazzi.evaluate.metrics import FAR, errors, known_truth, squared_in_sigmas
+from piazzi.evaluate.metrics import FAR, errors, known_truth, squared_in_sigmas, stays
 from piazzi.evaluate.rows import evaluate
 from piazzi.problem.checks import Array
 from piazzi.study.lanes import Scores
@@ -72,7 +72,7 @@ def score_lanes(scores: Scores, n: int, kept: Array, seconds: float) -> Scored:
     }
     diverged = np.median(scores.nees[:, half], axis=1) > FAR * quantile(0.999, float(n))
     if earlier.shape[2]:
-        diverged &= (_root_mean(later) >= 0.5 * _root_mean(earlier)).all(axis=1)
+        diverged &= stays(np.sqrt(squared[:, :, 0]), _root_mean(earlier), _root_mean(later)).all(axis=1)
     else:
         diverged[:] = False
     error = np.sqrt(squared[:, :, kept]).transpose(0, 2, 1)
