@@ -146,6 +146,16 @@ def test_bound_is_the_mean_of_the_bounds_of_the_runs():
     assert_array_equal(found["bound_runs"], [9, 9])
 
 
+def test_bound_is_the_same_mean_where_runs_come_in_pieces(monkeypatch):
+    study = small(problem=drawn_truth(), runs=100)
+    whole = bound_at(study, 0)
+    assert whole["bound_runs"][0] > 64 >= whole["bound_runs"][1] - sum(map(bool, simulated(study, Task(0, 0, 100)).wrong))
+    monkeypatch.setattr(Study, "largest_piece", 9)
+    pieces = bound_at(study, 0)
+    for name, values in whole.items():
+        assert_allclose(pieces[name], values, rtol=1e-6 if name == "bound" else 1e-12)
+
+
 def test_long_runs_are_kept_at_evenly_spaced_epochs():
     study = Study(satellite(), np.arange(1441) * 15.0, ["ekf"], 1)
     assert len(study.kept) == MOST_EPOCHS

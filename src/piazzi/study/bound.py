@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,9 +11,10 @@ from piazzi.problem.checks import Array
 from piazzi.simulation import true_problem
 from piazzi.study.lanes import Layout, compiles, filter_runs, in_lanes
 from piazzi.study.plan import BOUND_RUNS, Study
-from piazzi.study.runs import simulated
+from piazzi.study.runs import Runs, simulated
 from piazzi.study.tasks import Task
 
+VIEWS = "realtime", "delayed"
 SLOW_RUNS = 64  # truths where each takes a filter and a smoother of its own
 
 
@@ -29,19 +30,20 @@ def bound_at(study: Study, point: int) -> dict[str, Array]:
     bound_whole, bound_last_half : (2, G), roots of the means over the whole run and over its last half
     bound_runs : (2,), how many truths, the first of the point, were averaged over
     """
-    views = [view for _, view in study.rows]
-    runs = simulated(study, Task(point, 0, min(study.runs, BOUND_RUNS, study.largest_piece)))  # memory stays flat
-    good = [i for i, wrong in enumerate(runs.wrong) if not wrong]
-    K, G = len(study.times), len(study.groups)
-    variance, count = np.full((2, K, G), np.nan), np.zeros(2)
-    actual = replace(true_problem(runs.world), truth=None)
-    few = [runs.tracking(i) for i in good[:SLOW_RUNS]]
-    if good and "realtime" in views:
-        variance[0], count[0] = _realtime(study, actual, runs.truth[good], runs.z[good], few)
-    if good and "delayed" in views:
-        variance[1], count[1] = _mean(study, actual, few, "delayed")
-    count[count > 0] = [good[int(c) - 1] + 1 for c in count if c]  # runs without a truth are passed over
-    return _arrays(study, variance, count)
+    actual = replace(true_problem(study.problems(point)[0]), truth=None)
+    wanted, most = {view for _, view in study.rows}, min(study.runs, BOUND_RUNS)
+    means = [_Mean(np.zeros((len(study.times), len(study.groups)))) for _ in VIEWS]
+    for first in range(0, most, study.largest_piece):  # memory stays flat
+        runs = simulated(study, Task(point, first, min(study.largest_piece, most - first)))
+        good = [i for i, wrong in enumerate(runs.wrong) if not wrong]  # runs without a truth are passed over
+        looked_at = [
+            _add(mean, first, study, actual, runs, good, view)
+            for view, mean in zip(VIEWS, means, strict=True)
+            if view in wanted
+        ]
+        if good and not any(looked_at):
+            break
+    return _arrays(study, np.stack([mean.variance for mean in means]), np.array([mean.runs for mean in means]))
 
 
 def no_bound(study: Study) -> dict[str, Array]:
@@ -59,23 +61,49 @@ def _arrays(study: Study, variance: Array, count: Array) -> dict[str, Array]:
     }
 
 
-def _realtime(study: Study, actual: Problem, truth: Array, z: Array, trackings: list[Tracking]) -> tuple[Array, int]:
+@dataclass
+class _Mean:
+    """Variances of groups (K, G), summed over so many truths that have a bound, among so many that were looked at.
+
+    `runs` counts the runs up to the last of them, those without a truth too.
+    """
+
+    total: Array
+    known: int = 0
+    looked_at: int = 0
+    runs: int = 0
+
+    @property
+    def variance(self) -> Array:
+        return self.total / self.known if self.known else np.full_like(self.total, np.nan)
+
+
+def _add(mean: _Mean, first: int, study: Study, actual: Problem, runs: Runs, good: list[int], view: str) -> int:
+    """Add the bounds of truths to a mean; of how many: all in lanes, `SLOW_RUNS` in all one by one."""
     layout = Layout(actual, study.times)
-    if not (in_lanes(actual) and compiles(filter_runs, layout, z[:1], truth[:1])):
-        return _mean(study, actual, trackings, "realtime")
-    _, _, scores = filter_runs(layout, z, truth, at_truth=True)
-    assert scores is not None
-    return np.asarray(scores.spread.mean(axis=0).T), len(z)
+    sample = runs.z[good[:1]], runs.truth[good[:1]]
+    if good and view == "realtime" and in_lanes(actual) and compiles(filter_runs, layout, *sample):
+        _, _, scores = filter_runs(layout, runs.z[good], runs.truth[good], at_truth=True)
+        assert scores is not None
+        found = scores.spread.transpose(0, 2, 1)
+    else:
+        good = good[: SLOW_RUNS - mean.looked_at]
+        found = _one_by_one(study, actual, [runs.tracking(i) for i in good], view)
+    if good:
+        mean.total += found.sum(axis=0)
+        mean.known += len(found)
+        mean.looked_at += len(good)
+        mean.runs = first + good[-1] + 1
+    return len(good)
 
 
-def _mean(study: Study, actual: Problem, trackings: list[Tracking], view: str) -> tuple[Array, int]:
-    """Mean variance of each group, (K, G), over truths that have a bound, and how many truths were looked at."""
+def _one_by_one(study: Study, actual: Problem, trackings: list[Tracking], view: str) -> Array:
+    """Variance of each group (N, K, G), of the truths that have a bound."""
     from piazzi.evaluate.bounds import posterior_bounds
 
-    found = [posterior_bounds(actual, tracking) for tracking in trackings]
     out = []
-    for bounds in found:
+    for bounds in (posterior_bounds(actual, tracking) for tracking in trackings):
         if bounds is not None:
             diagonal = np.diagonal(bounds.of(view), axis1=1, axis2=2)
             out.append(np.stack([diagonal[:, list(c)].sum(axis=1) for c in study.groups.values()], axis=1))
-    return np.mean(out, axis=0) if out else np.full((len(study.times), len(study.groups)), np.nan), len(found)
+    return np.stack(out) if out else np.zeros((0, len(study.times), len(study.groups)))
