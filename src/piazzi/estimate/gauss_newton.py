@@ -12,7 +12,8 @@ from piazzi.problem.checks import Array
 
 TOO_WIDE = "the prior is too wide for covariances"
 FIRST_DAMPING, LARGEST_DAMPING = 1e-4, 1e12
-NEARLY, ROUGHLY = 1e-3, 10.0  # steps below so much of a sigma may be rounding, within so many times its estimate
+NEARLY, ROUGHLY = 3e-3, 10.0  # steps below so much of a sigma may be rounding, within so many times its estimate
+AMPLIFIED = 1e3  # times the last bits of the states: steps beyond that are none of rounding, which is dear to estimate
 SHRINKING = 0.05  # of the step before, or less: what a step near a solution is, unless it is rounding or converges slowly
 
 
@@ -50,7 +51,9 @@ def optimize(
             return Outcome(chain.P_pred, iteration, TOO_WIDE, _figures(chain, solver, costs))
         size = _size(chain)
         stuck = damping == 0.0 and NEARLY > size > max(SHRINKING * before, tolerance) and not chain.reweighted
-        at_rounding = stuck and size <= ROUGHLY * _rounding(chain, solver)
+        at_rounding = (
+            stuck and size <= AMPLIFIED * _measured(chain, _last_bits(chain)) and size <= ROUGHLY * _rounding(chain, solver)
+        )
         if damping == 0.0 and np.isfinite(cost) and (size <= tolerance or at_rounding):
             covariance = solver.marginals()
             if chain.report[STEP_SMOOTHED] <= (NEARLY if at_rounding else tolerance):
@@ -77,20 +80,31 @@ def _size(chain: Chain) -> float:
     return float(max(chain.report[STEP], np.sqrt(chain.report[GRADIENT])))
 
 
+def _last_bits(chain: Chain) -> Array:
+    """The last bits of all states (K, n), drawn anew."""
+    bits: Array = ROUNDING * np.abs(chain.x) * np.random.default_rng(0).uniform(-1.0, 1.0, chain.x.shape)
+    return bits
+
+
+def _measured(chain: Chain, changes: Array) -> float:
+    """Changes (K, n) in the measure of `_size`."""
+    return max(chain.largest(changes, chain.P_pred), chain.change(changes))
+
+
 def _rounding(chain: Chain, solver: Solver) -> float:
     """How much of a step may be rounding: what changes, in the measure of `_size`, where states are rounded otherwise.
 
-    The last bits of all states decide the last bits of what the dynamics make of them; here these are drawn anew.
+    The last bits of all states decide the last bits of what the dynamics make of them.
     """
     f, nu, step = chain.f.copy(), chain.nu.copy(), chain.dx.copy()
-    bits = ROUNDING * np.abs(chain.x) * np.random.default_rng(0).uniform(-1.0, 1.0, chain.x.shape)
+    bits = _last_bits(chain)
     chain.f[:-1] += bits[1:]
     chain.nu += chain.by_measurement(bits)
     solver.solve(0.0)
     chain.f[:], chain.nu[:] = f, nu
     other = chain.dx.copy()
     solver.solve(0.0)
-    return max(chain.largest(other - step, chain.P_pred), chain.change(other - step))
+    return _measured(chain, other - step)
 
 
 def _step(chain: Chain, solver: Solver, cost: float, damping: float, gated: bool) -> tuple[bool, float, float]:
