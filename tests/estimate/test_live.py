@@ -124,6 +124,68 @@ def test_a_late_measurement_is_taken_in_its_place_on_a_linear_problem(monkeypatc
     assert_array_equal(late.times, in_order.times)
 
 
+@pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.SlidingWindow(lag=3), pz.UnscentedKalmanFilter()])
+def test_a_prediction_is_part_of_a_checkpoint(two_radars, estimator, monkeypatch):
+    """It goes on from where it stands, to a later time or to the measurement that was waited for."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem, tracking = two_radars
+    one = estimator.start(problem)
+    for t, name, z in list(zip(tracking.row_times, tracking.row_stations, tracking.values, strict=True))[:12]:
+        one.update(str(name), z, t)
+    one.predict(t + 1.0)
+    other = estimator.start(problem)
+    other.predict(t + 50.0)
+    other.restore(one.checkpoint())
+    assert_array_equal(other.mean, one.mean)
+    for session in (one, other):
+        session.predict(t + 2.0)
+    assert_array_equal(other.mean, one.mean)
+    assert_array_equal(other.covariance, one.covariance)
+    for session in (one, other):
+        session.update("west", 3.0)
+    assert_array_equal(other.mean, one.mean)
+    assert other.time == t + 2.0
+
+
+@pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.SlidingWindow(lag=3)])
+def test_times_that_no_interval_reaches_are_refused(two_radars, estimator, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    live = estimator.start(two_radars[0])
+    live.update("east", 3.0, -1e308)
+    mean = live.mean.copy()
+    for what in (lambda: live.update("east", 3.0, 1e308), lambda: live.predict(np.float64(1e308))):
+        with pytest.raises(ValueError, match=r"the time is at 1e\+308 s, too far after -1e\+308 s"):
+            what()
+    with pytest.raises(ValueError, match="must be finite"):
+        live.predict(np.inf)
+    assert_array_equal(live.mean, mean)
+
+
+@pytest.mark.parametrize("loss", [None, "huber"])
+@pytest.mark.parametrize("lag", [3, 20])
+def test_late_rows_are_taken_in_their_places_while_states_leave(lag, loss, monkeypatch):
+    """A linear problem, rows of two stations shuffled within the lag, behind the first; a loss that no residual reaches."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    model = pz.Model(["x", "v"], ["v", "0"], [pz.Sensor("position", ["x"])])
+    stations = [pz.Station("a", "position", 0.1), pz.Station("b", "position", 0.2)]
+    problem = pz.Problem(model, pz.Gaussian([0, 1], np.eye(2)), pz.ProcessNoise([0, 0.1]), stations)
+    rng = np.random.default_rng(0)
+    tracking = pz.simulate(problem, np.cumsum(rng.uniform(0.1, 0.5, 60)), rng)
+    rows = list(zip(tracking.row_times, tracking.row_stations.astype(str), tracking.values, strict=True))
+    delay = np.where(np.arange(len(rows)), rng.uniform(0, 1.8 * (lag - 1), len(rows)), 0.0)
+    shuffled = [rows[i] for i in np.argsort(np.arange(len(rows)) + delay)]
+    in_order, late = (pz.SlidingWindow(lag, loss=loss and f"{loss}=1000").start(problem) for _ in range(2))
+    for t, name, z in rows:
+        in_order.update(name, z, t)
+    for t, name, z in shuffled:
+        assert late.update(name, z, t)
+    assert shuffled != rows
+    assert_array_equal(late.times, in_order.times)
+    assert_allclose(late.means, in_order.means, rtol=0, atol=1e-10)
+    assert_allclose(late.covariance, in_order.covariance, rtol=0, atol=1e-10)
+    assert_allclose(late.oldest.covariance, in_order.oldest.covariance, rtol=0, atol=1e-10)
+
+
 def test_a_measurement_older_than_the_window_is_refused_by_name(two_radars, monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     problem, tracking = two_radars

@@ -16,7 +16,15 @@ ESTIMATORS = {
     "window": pz.SlidingWindow(lag=4),
     "loss": pz.SlidingWindow(lag=4, loss="huber"),
 }
-MISSING = {"epoch_values", "z", "nu_lin", "innovation", "innovation_covariance", "clock"}  # where NaN means something
+MISSING = {
+    "pending",
+    "epoch_values",
+    "z",
+    "nu_lin",
+    "innovation",
+    "innovation_covariance",
+    "clock",
+}  # where NaN means something
 COVARIANCES = {"base_covariance", "P_pred", "P", "covariance", "oldest_covariance"}
 WHOLE = {"epoch_stations", "station", "count", "first_row"}
 UNUSED = {"refused"}

@@ -21,6 +21,7 @@ def undetermined(problem: Problem, first: Array, states: Array, last: Array | No
     states : (K, n), estimates, which tell how large each value (each group, as a vector) is
     last : (n, n), optional
         Covariance of the last state, where `first` is given the first measurements only: it tells what the others closed.
+        So do dynamics that let the direction shrink: what they take from it counts as closed.
     """
     sigma = np.sqrt(np.diag(problem.covariance))
     if not (sigma > OPEN * np.maximum(np.abs(states[0]), 1.0)).any():  # a lower bound of the sizes, which are dearer

@@ -10,7 +10,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.saved import Saved
 from piazzi.problem import Problem
-from piazzi.problem.checks import Array
+from piazzi.problem.checks import Array, check_span
 from piazzi.problem.manoeuvres import check_after
 
 
@@ -34,7 +34,9 @@ class Clock:
         since = self.time if since is None else since
         if since is None:
             check_after(self.problem.manoeuvres, t)
-        dt = 0.0 if since is None else t - since
+            return 0.0
+        check_span(since, t, "the time")
+        dt = float(t) - float(since)
         if dt < 0:
             raise ValueError(f"time {t:g} s is before {since:g} s, where the estimate stands")
         return dt

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import isnan
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ class LiveWindow:
 
     saved_names = (
         *("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before"),
-        *("nu_lin", "H_lin", "dx", "mean", "covariance", "oldest_covariance", "innovation", "innovation_covariance"),
+        *("nu_lin", "H_lin", "dx", "mean", "covariance", "oldest_covariance", "innovation", "innovation_covariance", "pending"),
     )
 
     def __init__(
@@ -93,9 +94,7 @@ class LiveWindow:
     def predict(self, t: float) -> None:
         """Carry the newest state's belief to time `t` for reading; the window itself moves at the next update."""
         now = self.time
-        dt = 0.0 if now is None else t - now
-        if not dt >= 0:
-            raise ValueError(f"time {t:g} s is before {now:g} s, where the estimate stands")
+        dt = self._clock.interval(t, now)
         self.mean, self.covariance = (a.copy() for a in self._newest)
         self._pending = t
         if now is not None and dt > 0:
@@ -146,7 +145,8 @@ class LiveWindow:
     def _append(self, t: float) -> None:
         """A new newest state, predicted; states beyond the lag leave."""
         window = self._window
-        self._predict_state(window.open_epoch(window.stop, t, *self._clock.step(t - float(window.t[window.stop - 1]))))
+        dt = self._clock.interval(t, float(window.t[window.stop - 1]))
+        self._predict_state(window.open_epoch(window.stop, t, *self._clock.step(dt)))
         stays = self._stays()
         if stays > window.first:
             self._span[:] = window.first, stays
@@ -187,6 +187,7 @@ class LiveWindow:
         window = self._window
         self._span[:] = window.first, window.stop - 1
         self._solve()
+        self._pending = self.time
         self.mean, self.covariance = window.x[window.stop - 1].copy(), self._newest_covariance.copy()
         self._newest = self.mean.copy(), self.covariance.copy()
         last = int(window.first_row[window.stop]) - 1
@@ -259,9 +260,11 @@ class LiveWindow:
             H = np.where(np.isnan(nu[: J * m])[:, None], 0.0, H[: J * m])  # what is missing has none
             out |= {"nu_lin": nu[: J * m].copy(), "H_lin": H, "dx": dx[:W].copy()}
             out["oldest_covariance"] = self._oldest_covariance[window.first].copy()
+        mean, covariance = self._newest
         return out | {
-            "mean": self.mean.copy(),
-            "covariance": self.covariance.copy(),
+            "mean": mean.copy(),
+            "covariance": covariance.copy(),
+            "pending": np.array([np.nan if self._pending is None else self._pending]),
             "innovation": self.innovation.copy(),
             "innovation_covariance": self.innovation_covariance.copy(),
             "refused": np.array([len(self.refused)], dtype=float),
@@ -270,8 +273,8 @@ class LiveWindow:
     def restore(self, saved: Mapping[str, Array]) -> None:
         """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
         n, m = self.problem.model.n, self.problem.model.width
-        # checkpoints of earlier versions have none
-        saved = {"innovation": np.full(m, np.nan), "innovation_covariance": np.full((m, m), np.nan)} | dict(saved)
+        unknown = np.full(m, np.nan), np.full((m, m), np.nan), np.array([np.nan])  # checkpoints of earlier versions
+        saved = {**dict(zip(("innovation", "innovation_covariance", "pending"), unknown, strict=True)), **saved}
         checked = Saved(saved, self.problem)
         W, (z, station) = checked.length("t"), checked.measurements("z", "station")
         J = len(z)
@@ -291,6 +294,10 @@ class LiveWindow:
         mean, covariance = checked.mean("mean"), checked.covariance("covariance")
         nu = checked.array("innovation", m, missing=True)
         S = checked.array("innovation_covariance", m, m, missing=True)
+        (pending,) = checked.array("pending", 1, missing=True).tolist()
+        newest = float(found["t"][-1]) if W else self.problem.prior_time
+        if newest is not None and pending < newest:
+            raise ValueError(f"the checkpoint's 'pending' is {pending:g} s; the newest epoch is at {newest:g} s")
         if W:
             linear = checked.array("nu_lin", J * m, missing=True), checked.array("H_lin", J * m, n), checked.array("dx", W, n)
             oldest = checked.covariance("oldest_covariance")
@@ -304,3 +311,6 @@ class LiveWindow:
             for values, kept in zip(self._linear, linear, strict=True):
                 values[: len(kept)] = kept
             self._oldest_covariance[0] = oldest
+        self._pending = None
+        if not isnan(pending):
+            self.predict(pending)

@@ -188,7 +188,7 @@ def sentences(comparison: Comparison) -> list[str]:
     sound = [r for r in comparison.rows if r.success and not r.diverged]
     out = [f"{r.estimator} did not succeed: {r.message}." for r in comparison.rows if not r.success]
     wayward = dict.fromkeys(r.estimator for r in comparison.rows if r.success and r.diverged)
-    out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down." for name in wayward]
+    out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down enough." for name in wayward]
     out += [*_rejected(comparison), *_modes(comparison)]
     if any(v is not None for r in sound for v in r.rmse.values()):
         out += [*_best(comparison, sound), *_honest(sound)]

@@ -108,7 +108,9 @@ def _failed(rows: Sequence[Row]) -> list[Point]:
     lost = [r for r in rows if r.success and r.diverged]
     if lost:
         out.append(
-            Point("Diverged", f"{_named(lost, rows)}: errors stay far beyond the covariance and do not come down.", "bad")
+            Point(
+                "Diverged", f"{_named(lost, rows)}: errors stay far beyond the covariance and do not come down enough.", "bad"
+            )
         )
     return out
 
