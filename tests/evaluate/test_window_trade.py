@@ -8,7 +8,7 @@ import pytest
 
 import piazzi as pz
 from piazzi.evaluate.window_trade import head, steps_of, timed_sizes
-from piazzi.present.report.windows import windows_section
+from piazzi.present.report import Chart, page, windows_section, windows_tab
 from tests.laws.problems import b612
 
 
@@ -77,6 +77,16 @@ def test_windows_of_a_singular_covariance_are_judged_by_its_rank():
     assert found.ideal_nees("realtime", "delayed") == (2.0,)
     assert "(ideal 2)" in str(found)
     assert windows_section(found).blocks[3].title == "Mean NEES, last half, ideal 2"
+
+
+def test_windows_without_any_uncertainty_have_no_nees_and_no_chart_of_it():
+    prior = pz.Gaussian.from_sigma([11, 0, 0, 10], [0, 0, 0, 0])
+    problem = b612(truth=None, prior=prior, process_noise=pz.ProcessNoise(np.zeros(4), "step"))
+    found = pz.windows(problem, pz.simulate(problem, np.arange(20) * 0.1, np.random.default_rng(0)), [1, 5], graph=False)
+    assert found.ideal_nees("realtime", "delayed") == ()
+    charts = [block.title for block in windows_section(found).blocks if isinstance(block, Chart)]
+    assert charts == ["RMSE of position, last half", "RMSE of velocity, last half", "Cost of a window"]
+    assert "Cost of a window" in page("windows", [windows_tab(found)])
 
 
 def test_without_truth_cost_and_nis_stand():

@@ -17,6 +17,7 @@ from piazzi.present.tables import summary
 from piazzi.problem.checks import Array
 
 _VIEWS = (("realtime", "window, real time", DASHES[0]), ("delayed", "window, delayed", DASHES[1]))
+_NAMES = tuple(view for view, _, _ in _VIEWS)
 _INTRO = "Errors and NEES of the last half of the run, and cost, against the number of states that a window keeps."
 
 
@@ -29,7 +30,8 @@ def windows_tab(trade: WindowTrade, *, title: str = "") -> Tab:
 
 def windows_section(trade: WindowTrade, *, words: bool = True) -> Section:
     """Errors, NEES and cost against window length, seconds of the graph against epochs, and their tables."""
-    charts = [*(_errors(trade, group) for group in trade.groups), *([_nees(trade)] if trade.groups else []), _cost(trade)]
+    nees = [_nees(trade)] if trade.ideal_nees(*_NAMES) else []  # none without a truth, nor where nothing is uncertain
+    charts = [*(_errors(trade, group) for group in trade.groups), *nees, _cost(trade)]
     timing = [] if trade.timing is None else [_timing(trade.timing.epochs, trade.timing.seconds)]
     tables = [table_of(grid) for grid in grids(trade)]
     says = [Text(sentences(trade))] if words else []
@@ -64,14 +66,14 @@ def _lines(trade: WindowTrade, values: dict[str, Array], graph: float | None) ->
 def _errors(trade: WindowTrade, group: str) -> Chart:
     rows = [*trade.realtime, *trade.delayed, *([trade.graph] if trade.graph else [])]
     show = row_display(trade.problem.model, rows, group)
-    values = {view: trade.rmse(group, view) for view, _, _ in _VIEWS}
+    values = {view: trade.rmse(group, view) for view in _NAMES}
     graph = trade.graph.rmse_last_half.get(group) if trade.graph else None
     return _chart(trade, f"RMSE of {group}, last half", Axis(f"{group} RMSE", show, "log"), _lines(trade, values, graph))
 
 
 def _nees(trade: WindowTrade) -> Chart:
-    values = {view: trade.mean_nees(view) for view, _, _ in _VIEWS}
-    best = trade.ideal_nees(*values)
+    values = {view: trade.mean_nees(view) for view in _NAMES}
+    best = trade.ideal_nees(*_NAMES)
     lines = _lines(trade, values, trade.graph.mean_nees_last_half if trade.graph else None)
     everything = np.concatenate([line.y for line in lines if isinstance(line.y, np.ndarray)] + [np.array(best)])
     good = everything[np.isfinite(everything) & (everything > 0)]
