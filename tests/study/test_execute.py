@@ -194,6 +194,20 @@ def test_a_bound_that_cannot_be_computed_is_told(tmp_path, monkeypatch):
     assert np.isfinite(stored.row(1, 0).error).all()
 
 
+@pytest.mark.parametrize(("points", "rest"), [(5, []), (7, ["... and 2 more Cramer-Rao bounds"])])
+def test_bounds_beyond_the_first_five_are_counted(tmp_path, monkeypatch, points, rest):
+    def refuse(study, task):
+        if task.count == 0:
+            raise ArithmeticError("no bound today")
+        return pieces.run_task(study, task)
+
+    monkeypatch.setattr(pool, "run_task", refuse)
+    study = small(runs=2, estimators=("ekf",), vary={"R.scale": list(range(1, points + 1))})
+    told = failures(run_study(study, tmp_path / "s.nc", workers=0).summary)
+    assert [line.partition(":")[0] for line in told[:5]] == [f"Cramer-Rao bound (R.scale = {i})" for i in range(1, 6)]
+    assert told[5:] == rest
+
+
 def test_runs_of_other_versions_are_not_gone_on_with(tmp_path, monkeypatch):
     """Their bits would differ, and nothing would show it."""
     study, path = small(runs=20), tmp_path / "s.nc"

@@ -137,6 +137,8 @@ def failures(summary: Summary, most: int = 5) -> list[str]:
     for m in unknown:
         point = point_name(dict(zip(stored.about["axes"], stored.points[m["point"]], strict=True)))
         out.append(printable(f"Cramer-Rao bound{f' ({point})' if point else ''}: {m['message']}"))
+    if len(document["bounds_unknown"]) > most:
+        out.append(f"... and {len(document['bounds_unknown']) - most:,} more Cramer-Rao bounds")
     return out
 
 
