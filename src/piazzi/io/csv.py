@@ -7,7 +7,6 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from fractions import Fraction
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +17,7 @@ from piazzi.io.cells import STATION, Cells, read_cells
 from piazzi.model import nearest
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, backwards, check_span
-from piazzi.scenarios.units import Units
+from piazzi.scenarios.units import Unit, Units
 
 if TYPE_CHECKING:
     from piazzi.estimate import Estimate
@@ -33,8 +32,9 @@ def read_csv(path: str | os.PathLike[str], problem: Problem) -> Tracking:
     """The measurements in a file, of a problem's stations.
 
     The first line names the columns: ``time``, ``station`` (not needed where there is one), the components of the sensors,
-    and, where the truth is known, ``truth:`` and a state.  Empty cells are missing values.  Numbers are in SI and radians,
-    or in the unit that a column names, as in ``bearing [deg]``, which must be of the column's kind.
+    and, where the truth is known, ``truth:`` and a state.  Empty cells are missing values.  Numbers are in SI and radians
+    (in the model's own units, where one made in Python names others), or in the unit that a column names, as in
+    ``bearing [deg]``, which must be of the column's kind.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def _components(problem: Problem, station: Array, values: Array) -> dict[str, Ar
     return out
 
 
-def _in_si(cells: Cells, problem: Problem) -> Cells:
+def _in_own_units(cells: Cells, problem: Problem) -> Cells:
     """The same table with the units of its column names taken into account."""
     numbers: dict[str, Array] = {}
     for name, column in cells.numbers.items():
@@ -136,32 +136,45 @@ def _in_si(cells: Cells, problem: Problem) -> Cells:
 
 
 def _factor(column: str, label: str, text: str, problem: Problem) -> float:
-    """What turns numbers in the unit `text` into SI; raises ValueError where what is called `label` has no such unit."""
-    unit = Units().unit(text)
-    own = _own_units(label, problem)
-    if own and unit.powers not in own.values():
+    """What turns numbers in the unit `text` into those of the model.
+
+    Raises
+    ------
+    ValueError
+        Where nothing that is called `label` is of such a kind, or where stations need different factors.
+    """
+    unit, own = Units().unit(text), _own_units(label, problem)
+    fitting = [mine for mine in own.values() if mine is None or mine.powers == unit.powers]
+    if own and not fitting:
         raise ValueError(f"column {column[:60]!r} has no unit of its kind: {label!r} is in {', '.join(sorted(own))}")
-    return unit.factor
+    factors = {unit.factor / (1.0 if mine is None else mine.factor) for mine in fitting} or {unit.factor}
+    if len(factors) > 1:
+        known = ", ".join(sorted(name or "no unit" for name in own))
+        raise ValueError(f"column {column[:60]!r} must name no unit: {label!r} is in {known}, by station")
+    return factors.pop()
 
 
-def _own_units(label: str, problem: Problem) -> dict[str, tuple[Fraction, ...]]:
-    """The SI units of what is in a column, with their exponents; none where a model made in Python names none that is known."""
-    sensors = [problem.model.sensor(s.sensor) for s in problem.stations]
-    names = {dict(sensor.units).get(label, "") for sensor in sensors}
+def _own_units(label: str, problem: Problem) -> dict[str, Unit | None]:
+    """The units that the model names for what is in a column, of all sensors that have it; None for one that is not known.
+
+    In a scenario they are SI; a model made in Python names what its numbers are in, which may be others, or none.
+    """
+    sensors = [dict(problem.model.sensor(s.sensor).units) for s in problem.stations]
+    names = {units[label] for units in sensors if label in units}
     if label == TIME:
         names = {"s"}
     elif label.startswith(TRUTH):
         names = {problem.model.unit(label.removeprefix(TRUTH))}
-    out: dict[str, tuple[Fraction, ...]] = {}
+    out: dict[str, Unit | None] = dict.fromkeys(names)
     for name in names:
         with suppress(ValueError):
-            out[name] = Units().unit(name).powers
+            out[name] = Units().unit(name)
     return out
 
 
 def cells_to_tracking(cells: Cells, problem: Problem) -> Tracking:
     """The measurements in a table; raises ValueError for columns, stations or cells that do not fit the problem."""
-    return _tracking(_in_si(cells, problem), problem)
+    return _tracking(_in_own_units(cells, problem), problem)
 
 
 def _tracking(cells: Cells, problem: Problem) -> Tracking:
