@@ -10,6 +10,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -20,6 +21,8 @@ from piazzi.study.pieces import run_task
 from piazzi.study.tasks import Task
 from tests.study.studies import small
 from tests.waiting import HANGS, until
+
+BUSY_MACHINE = 60  # seconds that a program may have to wait for its processor and its disk, where others run beside it
 
 pytest.importorskip("distributed", reason="Dask is not installed")
 
@@ -68,26 +71,63 @@ def study_program(*arguments):
     return [sys.executable, "-m", "piazzi", "study", "b612-range", "--with", "ekf", "--with", "window:10", *map(str, arguments)]
 
 
+def refused(address, folder):
+    """What a program that cannot begin says last, the seconds that it waited, and those that its processor was busy."""
+    command = study_program("--runs", 5, "--scheduler", address, "-o", folder / "s.nc")
+    started, before = time.monotonic(), processor_seconds_of_programs()
+    done = subprocess.run(command, capture_output=True, text=True, timeout=HANGS, check=False)
+    seconds, busy = time.monotonic() - started, processor_seconds_of_programs() - before
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    return done.stderr.splitlines()[-1], seconds - busy, busy
+
+
 def processor_seconds_of_programs():
     """Of those that this process started and that have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
-def test_dead_addresses_fail_within_ten_seconds(tmp_path):
-    """Seconds of waiting and of the processor, which are those of the clock unless others keep the processor busy."""
+@contextlib.contextmanager
+def dead_addresses():
+    """One where nobody listens, and one where somebody does and never says a word."""
     with socket.socket() as mute:
         mute.bind(("127.0.0.1", 0))
         mute.listen()
-        for address in ("tcp://127.0.0.1:1", f"tcp://127.0.0.1:{mute.getsockname()[1]}"):
-            before = processor_seconds_of_programs()
-            command = study_program("--runs", 5, "--scheduler", address, "-o", tmp_path / "s.nc")
-            done = subprocess.run(command, capture_output=True, text=True, timeout=HANGS, check=False)
-            assert CONNECT_SECONDS + processor_seconds_of_programs() - before < 10
-            assert done.returncode == 2
-            last = done.stderr.splitlines()[-1]
-            assert re.fullmatch(rf"piazzi: no Dask scheduler answers at {address} \(tried for \d s\)", last)
-            assert "Traceback" not in done.stderr
+        yield "tcp://127.0.0.1:1", f"tcp://127.0.0.1:{mute.getsockname()[1]}"
+
+
+def test_dead_addresses_fail_within_ten_seconds(tmp_path):
+    """Five of them to wait; the others for the imports, of which an address that makes no sense needs as many."""
+    assert CONNECT_SECONDS <= 5
+    last, waited, imports = refused("nonsense", tmp_path)
+    assert "no address of a scheduler" in last
+    assert waited < BUSY_MACHINE
+    with dead_addresses() as addresses:
+        for address in addresses:
+            last, waited, busy = refused(address, tmp_path)
+            assert re.fullmatch(rf"piazzi: no Dask scheduler answers at {address} \(tried for \d+ s\)", last)
+            assert waited < CONNECT_SECONDS + BUSY_MACHINE
+            assert busy < 3 * imports
+    assert os.listdir(tmp_path) == []
+
+
+def test_dead_addresses_are_tried_once_and_for_so_long(tmp_path, monkeypatch):
+    """Every time-out that Dask is handed before the study gives up."""
+    from distributed import comm
+
+    connect, handed = comm.connect, []
+
+    def connect_and_note(address, timeout=None, **others):
+        handed.append((address, timeout))
+        return connect(address, timeout=timeout, **others)
+
+    monkeypatch.setattr(comm, "connect", connect_and_note)
+    with dead_addresses() as addresses:
+        for address in addresses:
+            with pytest.raises(ConnectionError, match="no Dask scheduler answers"):
+                run_study(small(), tmp_path / "s.nc", scheduler=address)
+    assert handed == [(address, CONNECT_SECONDS) for address in addresses]
     assert os.listdir(tmp_path) == []
 
 
