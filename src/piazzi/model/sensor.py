@@ -67,7 +67,7 @@ class Sensor:
         `Station` that carries the sensor gives them values.
     angles : sequence of component names
         Components that are angles in radians: their innovations wrap into (-pi, pi].
-    units : mapping of component name to unit, for tables and pictures; angles default to "rad".
+    units : mapping of component name to unit, for tables, pictures and columns of files; angles default to "rad".
     number_units : mapping of the sensor's own numbers to units, for those that are estimated
 
     Raises
