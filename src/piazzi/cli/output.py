@@ -10,9 +10,12 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 STDOUT = "-"
 _UNLIMITED = 1000  # columns where nobody looks at a terminal: nothing wraps
@@ -42,7 +45,8 @@ def print_rich(*parts: Any) -> None:
     given = os.environ.get("COLUMNS", "")
     columns = int(given) if given.isdecimal() and given.isascii() else 0  # some shells and editors set 0 where they do not know
     width = columns or (shutil.get_terminal_size().columns if stream.isatty() else _UNLIMITED)
-    console = Plain(file=stream, width=width, highlight=False, emoji=False, markup=False)
+    height = shutil.get_terminal_size().lines  # given both, rich does not read COLUMNS itself, which may be no number
+    console = Plain(file=stream, width=width, height=height, highlight=False, emoji=False, markup=False)
     for part in parts:
         console.print(printable(part) if isinstance(part, str) else part, soft_wrap=isinstance(part, str))
 
@@ -119,17 +123,24 @@ def write_csv(path: str, rows: Sequence[Mapping[str, Any]]) -> None:
         writer.writerows(rows)
 
 
+def beside() -> Console:
+    """Where bars are drawn: stderr, as wide as the terminal."""
+    from rich.console import Console
+
+    size = shutil.get_terminal_size()
+    return Console(stderr=True, width=size.columns, height=size.lines)
+
+
 @contextmanager
 def progress(total: int, long: bool = True) -> Iterator[Callable[[str], None]]:
     """A function to call with the name of each step as it begins; shows a bar where work is long and stderr is a terminal."""
     if not (long and sys.stderr is not None and sys.stderr.isatty()):
         yield lambda step: None
         return
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (BarColumn(bar_width=24), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=beside(), transient=True) as bar:
         task = bar.add_task("", total=total)
         done = -1
 

@@ -179,7 +179,6 @@ def _bar(total: int) -> Iterator[Callable[[int, int], None]]:
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda done, total: None
         return
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TimeRemainingColumn
     from rich.text import Text
 
@@ -189,6 +188,6 @@ def _bar(total: int) -> Iterator[Callable[[int, int], None]]:
             return Text("" if speed is None else f"{speed:,.3g} runs/s")
 
     columns = (BarColumn(bar_width=24), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=output.beside(), transient=True) as bar:
         task = bar.add_task("", total=total)
         yield lambda done, total: bar.update(task, completed=done)
