@@ -20,6 +20,7 @@ STAGES = """
 expressions
 model
 kernels
+earth
 problem tracking orbit
 scenarios
 simulation
@@ -32,6 +33,7 @@ __init__
 cli
 __main__
 """
+IMPORTED_AS = {"pyerfa": "erfa"}  # where a package and its module have different names
 RANK = {stage: rank for rank, line in enumerate(STAGES.split("\n")) for stage in line.split()}
 
 
@@ -86,7 +88,8 @@ def packages_imported(folder: Path) -> dict[str, str]:
 
 def declared(requirements: list[str]) -> set[str]:
     """What requirements bring by name, extras and all: ``dask[distributed]>=1`` is dask and distributed."""
-    return {name for text in requirements for name in re.findall(r"[\w.-]+", re.split(r"[<>=!~;]", text)[0])}
+    names = {name for text in requirements for name in re.findall(r"[\w.-]+", re.split(r"[<>=!~;]", text)[0])}
+    return {IMPORTED_AS.get(name, name.replace("-", "_")) for name in names}
 
 
 def test_every_package_imported_is_declared():

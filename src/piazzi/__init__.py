@@ -6,6 +6,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from piazzi import earth
+    from piazzi.earth import Epoch
     from piazzi.estimate import (
         Bank,
         BatchLeastSquares,
@@ -83,6 +85,8 @@ _WHERE = {
     "simulate": "piazzi.simulation",
     "load": "piazzi.loading",
     "write_report": "piazzi.present.report",
+    "Epoch": "piazzi.earth",
+    "earth": "",  # a package of its own
 }
 
 __version__ = "0.1.0"
@@ -94,6 +98,7 @@ __all__ = [
     "Discrete",
     "DormandPrince",
     "DormandPrince5",
+    "Epoch",
     "Estimate",
     "Euler",
     "ExtendedKalmanFilter",
@@ -134,6 +139,7 @@ __all__ = [
     "WindowTrade",
     "choose_substeps",
     "compare",
+    "earth",
     "kepler_transition",
     "load",
     "observability",
@@ -153,7 +159,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _WHERE:
         raise AttributeError(f"module 'piazzi' has no attribute {name!r}")
-    value = getattr(import_module(_WHERE[name]), name)
+    home = _WHERE[name]
+    value = getattr(import_module(home), name) if home else import_module(f"piazzi.{name}")
     globals()[name] = value
     return value
 
