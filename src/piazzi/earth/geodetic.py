@@ -47,10 +47,12 @@ def position_to_geodetic(position: Array, ellipsoid: str | tuple[float, float] =
     import erfa
 
     axes, position = _axes(ellipsoid), np.asarray(position, dtype=float)
-    longitude, latitude, height = erfa.gc2gde(*axes, position)  # a micrometre off at the height of satellites
-    missed = position - erfa.gd2gce(*axes, longitude, latitude, height)
-    sine, cosine = np.sin(latitude), np.cos(latitude)
-    outwards = missed[..., 0] * np.cos(longitude) + missed[..., 1] * np.sin(longitude)
-    curvature = np.linalg.norm(position, axis=-1)  # near enough the radius along the meridian for a step of a micrometre
-    latitude = latitude + (missed[..., 2] * cosine - outwards * sine) / curvature
-    return np.clip(latitude, -np.pi / 2, np.pi / 2), longitude, height + missed[..., 2] * sine + outwards * cosine
+    longitude, latitude, height = erfa.gc2gde(*axes, position)
+    radius = np.linalg.norm(position, axis=-1)  # near enough that of the meridian for steps of micrometres
+    for _ in range(2):  # ERFA's answer is micrometres off at the height of satellites
+        missed = position - erfa.gd2gce(*axes, longitude, latitude, height)
+        sine, cosine = np.sin(latitude), np.cos(latitude)
+        outwards = missed[..., 0] * np.cos(longitude) + missed[..., 1] * np.sin(longitude)
+        latitude = np.clip(latitude + (missed[..., 2] * cosine - outwards * sine) / radius, -np.pi / 2, np.pi / 2)
+        height = height + missed[..., 2] * sine + outwards * cosine
+    return latitude, longitude, height
