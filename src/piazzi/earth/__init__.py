@@ -2,6 +2,7 @@
 
 from piazzi.earth.eop import EOP, EOPTable, EOPWarning, read_eop
 from piazzi.earth.epoch import Epoch
+from piazzi.earth.fields import GravityField, gravity_field, read_gravity
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
 from piazzi.earth.rotation import FRAMES, rotation, rotation_rate, transform
 
@@ -11,9 +12,12 @@ __all__ = [
     "EOPTable",
     "EOPWarning",
     "Epoch",
+    "GravityField",
     "geodetic_to_position",
+    "gravity_field",
     "position_to_geodetic",
     "read_eop",
+    "read_gravity",
     "rotation",
     "rotation_rate",
     "transform",
