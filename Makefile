@@ -59,7 +59,7 @@ constraints: ## resolve every pin in constraints.txt anew
 	@echo "Resolving the newest versions that work together (a few minutes)"
 	@rm -rf .cache/pins && "$(PYTHON)" -m venv .cache/pins
 	@.cache/pins/bin/python -m pip -qq --no-input install --no-compile '.[dev,bench,cluster,docs]'
-	@{ sed -n '/^#/p' constraints.txt; .cache/pins/bin/python -m pip freeze --exclude piazzi | LC_ALL=C sort -f; } > .cache/pins.txt
+	@{ sed -n '/^#/p' constraints.txt; .cache/pins/bin/python -m pip freeze --exclude piazzi | sed '/\.dev[0-9]/d' | LC_ALL=C sort -f; } > .cache/pins.txt
 	@mv .cache/pins.txt constraints.txt && rm -rf .cache/pins
 
 clean: ## remove what was made, but keep .venv

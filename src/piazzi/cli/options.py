@@ -18,10 +18,16 @@ class WholeNumber(click.IntRange):
     name = "whole number"
 
 
-class Number(click.types.FloatParamType):
+class Number(click.ParamType):
     """A number, by that name where it is refused."""
 
     name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a valid number.", param, ctx)
 
 
 source = click.argument("source", metavar="SOURCE")

@@ -1,0 +1,79 @@
+"""Installs Piazzi with the lowest or the newest versions that it allows, and runs every command with them.
+
+`python tests/smoke/versions.py lowest|newest`: pip knows no lowest versions, so each ``name>=1.2,<2`` of pyproject.toml becomes
+the constraint ``name==1.2``; newest are those that pip finds, upper bounds or not, so that what comes next is known before it
+is allowed.  Everything is made anew in .cache.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMANDS = Path(__file__).with_name("commands.py")
+EXTRA = "cluster"  # what a user may ask for beyond what is always there
+
+
+def parts(requirement: str) -> tuple[str, str, str]:
+    """Name, extras and lowest version: ``dask[distributed]>=2024.1,<2030`` is ``dask``, ``[distributed]`` and ``2024.1``.
+
+    Raises
+    ------
+    ValueError
+        Where no lower bound is given.
+    """
+    found = re.match(r"\s*([\w.-]+)\s*(\[[^]]*\])?[^;]*>=\s*([\w.]+)", requirement)
+    if found is None:
+        raise ValueError(f"{requirement!r} has no lower bound")
+    return found[1], found[2] or "", found[3]
+
+
+def lowest(requirement: str) -> str:
+    """The constraint that takes the lowest version."""
+    name, _, version = parts(requirement)
+    return f"{name}=={version}"
+
+
+def newest(requirement: str) -> str:
+    """The requirement without what keeps it from newer versions."""
+    return "{}{}>={}".format(*parts(requirement))
+
+
+def requirements() -> list[str]:
+    """What Piazzi needs, that extra included."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    return [*project["dependencies"], *project["optional-dependencies"][EXTRA]]
+
+
+def main(which: str) -> int:
+    place = ROOT / ".cache" / f"smoke-{which}"
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir(parents=True)
+    venv.create(place / "venv", with_pip=True)
+    python = place / "venv" / ("Scripts" if os.name == "nt" else "bin") / "python"
+    pip = [python, "-m", "pip", "-q", "-q", "--no-input", "--disable-pip-version-check", "install", "--no-compile"]
+    if which == "lowest":
+        (place / "constraints.txt").write_text("\n".join(map(lowest, requirements())))
+        steps = [[*pip, "-c", place / "constraints.txt", f"{ROOT}[{EXTRA}]"]]
+    else:
+        steps = [[*pip, *map(newest, requirements())], [*pip, "--no-deps", ROOT]]
+    environment = {**os.environ, "PIAZZI_CACHE": str(place / "kernels")}
+    try:
+        for step in [*steps, [python, "-P", COMMANDS]]:
+            subprocess.run(step, env=environment, check=True)
+    except subprocess.CalledProcessError as error:
+        return error.returncode
+    finally:
+        shutil.rmtree(place / "venv")
+    return 0
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] not in (["lowest"], ["newest"]):
+        sys.exit("usage: versions.py lowest|newest")
+    sys.exit(main(sys.argv[1]))
