@@ -4,7 +4,9 @@ Needs nothing but Piazzi and what it requires; where Dask is there, a study runs
 exit status is 0 and everything written can be read again; what a command says on stderr is shown.
 """
 
+import ast
 import csv
+import importlib
 import importlib.util
 import json
 import os
@@ -52,9 +54,10 @@ study own.toml --runs 6 --with ekf -o study.nc --resume --json
 """.strip().splitlines()
 CLUSTER = "study own.toml --runs 6 --with ekf --scheduler local --workers 1 -o cluster.nc"
 USAGE = ("", "estimate", "estimate nowhere.nc", "estimate own.nc --seed x", "simulate own.toml --tolerance x")
+OPTIONAL = {"IPython", "bokeh", "dask", "distributed"}
 PACKAGES = (
     *("click", "h5netcdf", "h5py", "llvmlite", "matplotlib", "numba", "numpy", "pandas", "rich", "sympy", "xarray"),
-    *("dask", "distributed", "bokeh", "pydantic"),
+    *("pyerfa", "astropy-iers-data", "dask", "distributed", "bokeh", "pydantic"),
 )
 
 
@@ -62,6 +65,27 @@ def run(words: str, folder: Path) -> tuple[int, str, list[str]]:
     """Exit status, stdout, and the lines of stderr that are not about compiling."""
     done = subprocess.run([sys.executable, "-P", "-m", "piazzi", *words.split()], cwd=folder, capture_output=True, text=True)
     return done.returncode, done.stdout, [e for e in done.stderr.splitlines() if not e.startswith("piazzi: compiling")]
+
+
+def imports() -> int:
+    """Number of packages that a module of Piazzi imports, somewhere, and that cannot be imported."""
+    import piazzi
+
+    found = {}
+    for file in sorted(Path(piazzi.__path__[0]).rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [node.module] if isinstance(node, ast.ImportFrom) and not node.level else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            found |= {name: file.name for name in names if name.partition(".")[0] not in {"piazzi", *sys.stdlib_module_names}}
+    failures = 0
+    for name, file in found.items():
+        try:
+            importlib.import_module(name)
+        except Exception as error:
+            if name.partition(".")[0] not in OPTIONAL or not isinstance(error, ModuleNotFoundError):
+                failures += 1
+                print(f"FAILED  {name}, of {file}: {type(error).__name__}: {str(error).splitlines()[0]}")
+    return failures
 
 
 def readable(path: Path) -> None:
@@ -98,7 +122,7 @@ def readable(path: Path) -> None:
 
 def smoke(folder: Path) -> int:
     """Number of failures."""
-    failures = 0
+    failures = imports()
     (folder / "own.toml").write_text(SCENARIO)
     for words in [*COMMANDS, *([CLUSTER] if importlib.util.find_spec("distributed") else [])]:
         started = time.monotonic()
