@@ -18,16 +18,12 @@ class WholeNumber(click.IntRange):
     name = "whole number"
 
 
-class Number(click.ParamType):
+def number(text: str) -> float:
     """A number, by that name where it is refused."""
-
-    name = "number"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        try:
-            return float(value)
-        except ValueError:
-            self.fail(f"{value!r} is not a valid number.", param, ctx)
+    try:
+        return float(text)
+    except ValueError:
+        raise click.BadParameter(f"{text!r} is not a valid number.") from None
 
 
 source = click.argument("source", metavar="SOURCE")

@@ -25,7 +25,7 @@ ENDINGS = (".nc", ".csv", ".npz")
 @options.scenario
 @click.option(
     "--tolerance",
-    type=options.Number(),
+    type=options.number,
     metavar="SIGMA",
     help="Choose the substeps: their error moves no estimate by more standard deviations.",
 )
