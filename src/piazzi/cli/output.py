@@ -118,9 +118,20 @@ def write_csv(path: str, rows: Sequence[Mapping[str, Any]]) -> None:
     from piazzi.io.atomic import atomic_path
 
     with atomic_path(path) as work, open(work, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
-        writer.writeheader()
-        writer.writerows(rows)
+        keys = list(dict.fromkeys(key for row in rows for key in row))
+        writer = csv.writer(file)
+        writer.writerow(map(_cell, keys))
+        writer.writerows([_cell(row.get(key)) for key in keys] for row in rows)
+
+
+def _cell(value: Any) -> Any:
+    """Text that nothing is hidden in, and that no spreadsheet takes for a formula; anything else as it is."""
+    if not isinstance(value, str):
+        return value
+    from piazzi.evaluate.quantities import printable
+
+    text = printable(value)
+    return f"'{text}" if text[:1] in ("=", "+", "-", "@") else text
 
 
 def beside() -> Console:
