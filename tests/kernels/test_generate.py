@@ -18,7 +18,8 @@ ROOT = Path(__file__).resolve().parents[2]
 SOURCES = """
 import hashlib, numpy as np, piazzi as pz
 from tests.laws.problems import b612, network, satellite
-for problem in (satellite(), satellite(pz.RungeKutta4(2)), b612(), network(np.random.default_rng(0))):
+from tests.model.test_definitions import NAMED, problem as with_definitions
+for problem in (satellite(), satellite(pz.RungeKutta4(2)), b612(), network(np.random.default_rng(0)), with_definitions(NAMED)):
     for backend in ("plain", "compiled"):
         print(hashlib.sha256(problem.spec("transition", "filter").source(backend).encode()).hexdigest())
 """
@@ -32,7 +33,7 @@ def test_sources_are_the_same_in_every_process():
         run = subprocess.run([sys.executable, "-c", SOURCES], check=True, capture_output=True, text=True, cwd=ROOT, env=env)
         printed.add(run.stdout)
     assert len(printed) == 1
-    assert len(set(printed.pop().split())) == 8
+    assert len(set(printed.pop().split())) == 10
 
 
 @pytest.mark.parametrize(

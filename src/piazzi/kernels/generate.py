@@ -22,7 +22,7 @@ from piazzi.kernels.printer import function
 from piazzi.kernels.steps import adaptive_source, axes_source, kepler_source, runge_kutta_source
 from piazzi.kernels.steps import inline_source as _inline
 from piazzi.model import Model
-from piazzi.model.derivation import constant_acceleration_step, derive, derive_sensor, jacobian
+from piazzi.model.derivation import constant_acceleration_step, derive, derive_sensor
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -125,8 +125,8 @@ def _dynamics_source(model: Model) -> str:
     whole = f"alike(x, {', '.join(rates + ['0.0'] * (n - nd))})"
     rows = ", ".join(F.row_times(i, _rows(model), n) for i in range(nd))
     return (
-        function("scalar_f", arguments, names, list(d.f))
-        + function("scalar_f_F", arguments, names, list(d.f) + F.outputs)
+        function("scalar_f", arguments, names, list(d.f), d.values)
+        + function("scalar_f_F", arguments, names, list(d.f) + F.outputs, d.partials)
         + _inline("dynamics(t, x, p)", _unpack(rates, f"scalar_f({call})"), f"return {whole}")
         + _inline("rhs(t, x, R, p)", _unpack(rates + F.names, f"scalar_f_F({call})"), f"return {whole}, matrix({rows})")
     )
@@ -141,7 +141,7 @@ def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
         return kepler_source(model, *scheme[1:])
     if scheme[0] == "taylor":
         return _taylor_source(model)
-    return _map_source(model, tuple(derive(model).f), derive(model).dt)
+    return _map_source(model)
 
 
 def _taylor_source(model: Model) -> str:
@@ -160,8 +160,8 @@ def _taylor_source(model: Model) -> str:
     products += [f"V{j} = R[{j}] + h*K{j}" for j in used]
     new = [f"V{i}" if i == j else f"R[{i}] + half*(R[{j}] + V{j})" for i, j in enumerate(rates)]
     return (
-        function("scalar_step", arguments, names, list(nxt))
-        + function("scalar_step_F", arguments, names, list(nxt) + F.outputs)
+        function("scalar_step", arguments, names, list(nxt), d.values)
+        + function("scalar_step_F", arguments, names, list(nxt) + F.outputs, d.partials)
         + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
         + _inline(
             "substep_jacobian(t, h, x, R, p)",
@@ -173,20 +173,18 @@ def _taylor_source(model: Model) -> str:
     )
 
 
-def _map_source(model: Model, nxt: Sequence[sp.Expr], h: sp.Symbol) -> str:
+def _map_source(model: Model) -> str:
     """A step given as a formula: its Jacobian is derived."""
-    import sympy as sp
-
-    arguments, names, call = _arguments(model, ("h",))
-    names = {**names, h: "h"}
+    d, (arguments, names, call) = derive(model), _arguments(model, ("h",))
+    names = {**names, d.dt: "h"}
     nd, n = len(model.moving), model.n
-    G = _Jacobian(jacobian(sp.Matrix(list(nxt)), derive(model).x), "G")
+    G = _Jacobian(d.F, "G")
     results = [f"n{i}" for i in range(nd)]
     whole = f"alike(x, {', '.join(results + [f'x[{i}]' for i in range(nd, n)])})"
     rows = ", ".join(G.row_times(i, _rows(model), n) for i in range(nd))
     return (
-        function("scalar_step", arguments, names, list(nxt))
-        + function("scalar_step_G", arguments, names, list(nxt) + G.outputs)
+        function("scalar_step", arguments, names, list(d.f), d.values)
+        + function("scalar_step_G", arguments, names, list(d.f) + G.outputs, d.partials)
         + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
         + _inline(
             "substep_jacobian(t, h, x, R, p)",
@@ -200,16 +198,16 @@ def _sensor_source(model: Model) -> str:
     functions, measure, innovate = [], [], []
     measure_lanes, innovate_lanes = [], []
     for index, sensor in enumerate(model.sensors):
-        h, H, own = derive_sensor(model, sensor)
+        d = derive_sensor(model, sensor)
         arguments, names, call = _arguments(model)
-        arguments += [f"s{i}" for i in range(len(own))]
-        names |= {s: f"s{i}" for i, s in enumerate(own)}
-        call += "".join(f", s[at + {i}]" for i in range(len(own)))
-        J = _Jacobian(H, "H")
+        arguments += [f"s{i}" for i in range(len(d.own))]
+        names |= {s: f"s{i}" for i, s in enumerate(d.own)}
+        call += "".join(f", s[at + {i}]" for i in range(len(d.own)))
+        J = _Jacobian(d.H, "H")
         seen = [f"h{i}" for i in range(sensor.width)]
         functions += [
-            function(f"scalar_h{index}", arguments, names, list(h)),
-            function(f"scalar_h{index}_H", arguments, names, list(h) + J.outputs),
+            function(f"scalar_h{index}", arguments, names, list(d.h), d.values),
+            function(f"scalar_h{index}_H", arguments, names, list(d.h) + J.outputs, d.partials),
         ]
         guard = f"if sensor == {index}:" if len(model.sensors) > 1 else "if True:"
         measure += [guard, "    " + _unpack(seen, f"scalar_h{index}({call})")]

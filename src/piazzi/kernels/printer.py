@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
+    from piazzi.model.derivation import Stage
+
 CALLS = {
     **{
         name: name
@@ -38,6 +40,7 @@ class _Writer:
         self.depths: dict[sp.Symbol, int] = {}
         self.lines: list[str] = []
         self.temporaries: dict[str, str] = {}
+        self.shared = self.defined = 0  # names given to common parts, and to values of stages
 
     def name(self, symbol: sp.Symbol, name: str, value: sp.Expr) -> None:
         """Assign a shared subexpression."""
@@ -151,23 +154,39 @@ def _is_literal(text: str) -> bool:
     return not text.startswith("-")
 
 
-def function(name: str, arguments: Sequence[str], names: Mapping[sp.Symbol, str], outputs: Sequence[sp.Expr]) -> str:
+def function(
+    name: str,
+    arguments: Sequence[str],
+    names: Mapping[sp.Symbol, str],
+    outputs: Sequence[sp.Expr],
+    stages: Sequence[Stage] = (),
+) -> str:
     """Source of an inlined scalar function that returns the tuple of `outputs`.
 
-    `names` gives each SymPy symbol its argument's name.
+    `names` gives each SymPy symbol its argument's name.  Stages are worked out first, in their order; common subexpressions are
+    taken out of each by itself, so that the source and the time to make it grow with the number of stages.
     """
+    writer = _Writer(names)
+    for stage in stages:
+        for symbol, value in zip(stage.symbols, _without_common(writer, stage.values), strict=True):
+            writer.name(symbol, f"d{writer.defined}", value)
+            writer.defined += 1
+    results = [writer.text(e) for e in _without_common(writer, outputs)]
+    body = [*writer.lines, f"return ({', '.join(results)},)"]
+    return f"@inline\ndef {name}({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in body) + "\n\n"
+
+
+def _without_common(writer: _Writer, expressions: Sequence[sp.Expr]) -> list[sp.Expr]:
+    """The expressions with their common parts written by `writer` and replaced by symbols."""
     import sympy as sp
 
-    shared, reduced = sp.cse(list(outputs), symbols=sp.numbered_symbols("c", cls=sp.Dummy))
-    writer = _Writer(names)
+    shared, reduced = sp.cse(list(expressions), symbols=sp.numbered_symbols("c", cls=sp.Dummy))
     spread: dict[sp.Expr, sp.Expr] = {}
-    for i, (temporary, value) in enumerate(shared):
+    for temporary, value in shared:
         whole = value.xreplace(spread)
         if writer.is_late_product(whole):
             spread[temporary] = whole
         else:
-            writer.name(temporary, f"c{i}", whole)
-    reduced = [e.xreplace(spread) for e in reduced]
-    results = [writer.text(e) for e in reduced]
-    body = [*writer.lines, f"return ({', '.join(results)},)"]
-    return f"@inline\ndef {name}({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in body) + "\n\n"
+            writer.name(temporary, f"c{writer.shared}", whole)
+        writer.shared += 1
+    return [e.xreplace(spread) for e in reduced]

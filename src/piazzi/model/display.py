@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from piazzi.model.derivation import derive, derive_sensor
+from piazzi.model.derivation import Stage, derive, derive_sensor
 
 if TYPE_CHECKING:
     from piazzi.model.model import Model
@@ -19,13 +20,25 @@ def sections(model: Model) -> list[tuple[str, Any]]:
     out: list[tuple[str, Any]] = [("state x", sp.Matrix(d.x))]
     if model.parameters:
         out.append(("parameters p", sp.Matrix([sp.Symbol(p) for p in model.parameter_names])))
+    out += _shown(d.partials)
     out += [(name_of_f, d.f), ("Phi = dx[k+1]/dx" if model.discrete else "F = df/dx", d.F)]
     for sensor in model.sensors:
-        h, H, own = derive_sensor(model, sensor)
-        if own:
-            out.append((f"numbers of {sensor.name}", sp.Matrix(own)))
-        out += [(f"h of {sensor.name}", h), (f"H = dh/dx of {sensor.name}", H)]
+        s = derive_sensor(model, sensor)
+        if s.own:
+            out.append((f"numbers of {sensor.name}", sp.Matrix(s.own)))
+        out += _shown(s.partials, f" for {sensor.name}")
+        out += [(f"h of {sensor.name}", s.h), (f"H = dh/dx of {sensor.name}", s.H)]
     return out
+
+
+def _shown(stages: Sequence[Stage], what: str = "") -> list[tuple[str, Any]]:
+    """Definitions with their derivatives."""
+    import sympy as sp
+
+    if not stages:
+        return []
+    rows = [[s, v] for stage in stages for s, v in zip(stage.symbols, stage.values, strict=True)]
+    return [(f"definitions and their derivatives{what}", sp.Matrix(rows))]
 
 
 def latex(model: Model) -> str:

@@ -9,7 +9,9 @@ from functools import cached_property
 from typing import Any
 
 from piazzi.expressions import names
-from piazzi.model.sensor import Parameter, Sensor, name_of, several, text_of
+from piazzi.model.definitions import definitions_of, needed, unused
+from piazzi.model.naming import name_of, text_of
+from piazzi.model.sensor import Parameter, Sensor, several
 
 TIME = "t"
 STEP = "dt"
@@ -42,6 +44,9 @@ class Model:
     discrete : bool
     memory : mapping of name to state, such as ``{"x_before": "x"}``
         Further values that hold what a state was at the epoch before, for measurements of two neighbouring states.
+    definitions : mapping of name to equation, such as ``{"r2": "x**2 + y**2"}``
+        Values that dynamics, sensors and other definitions use by name, in any order.  Each is worked out once, and derived by
+        the chain rule; nothing is substituted.
 
     Raises
     ------
@@ -57,6 +62,7 @@ class Model:
     units: Any = field(default_factory=dict)
     discrete: bool = False
     memory: Any = field(default_factory=dict)
+    definitions: Any = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -65,6 +71,7 @@ class Model:
         put(self, "sensors", self._sensors())
         remembered = tuple((name_of(k, "memory"), str(v)) for k, v in dict(self.memory).items())
         put(self, "memory", remembered)
+        put(self, "definitions", definitions_of(self.definitions, "definitions"))
         put(self, "dynamics", self._equations())
         put(self, "groups", tuple((str(g), tuple(str(s) for s in members)) for g, members in dict(self.groups).items()))
         put(self, "units", tuple((str(s), str(u)) for s, u in dict(self.units).items()))
@@ -102,6 +109,7 @@ class Model:
         taken: dict[str, str] = {TIME: "the time", STEP: "the length of a step"}
         everything = [("state", s) for s in self.states] + [("parameter", p.name) for p in self.parameters]
         everything += [("memory", name) for name, _ in self.memory]
+        everything += [("definition", name) for name, _ in self.definitions]
         for what, name in everything:
             if name in taken:
                 raise ValueError(f"{what} {name!r} is also {taken[name]}: every name has one meaning")
@@ -111,6 +119,9 @@ class Model:
             if sensor.name in seen:
                 raise ValueError(f"two sensors are called {sensor.name!r}")
             seen.add(sensor.name)
+            for name, _ in sensor.definitions:
+                if name in taken:
+                    raise ValueError(f"sensor {sensor.name!r} defines {name!r}, which is also {taken[name]}")
         for group, members in self.groups:
             for member in members:
                 if member not in self.names:
@@ -123,14 +134,19 @@ class Model:
                 raise ValueError(f"units names {name!r}, which is not a state{nearest(name, self.names)}")
 
     def _check_equations(self) -> None:
-        allowed = {*self.moving, *self.parameter_names, TIME} | ({STEP} if self.discrete else set())
-        for state, equation in zip(self.states, self.dynamics, strict=True):
+        defined = {name for name, _ in self.definitions}
+        allowed = {*self.moving, *self.parameter_names, TIME, *defined} | ({STEP} if self.discrete else set())
+        equations = [(f"dynamics of {state!r}", text) for state, text in zip(self.states, self.dynamics, strict=True)]
+        for what, equation in [*equations, *((f"definition {name!r}", text) for name, text in self.definitions)]:
             for name in sorted(names(equation) - allowed):
                 hint = nearest(name, sorted(allowed))
-                raise ValueError(f"dynamics of {state!r} uses {name!r}, which is neither a state nor a parameter{hint}")
+                raise ValueError(f"{what} uses {name!r}, which is neither a state nor a parameter{hint}")
         for sensor in self.sensors:
-            if STEP in sensor.free_names:
+            if STEP in needed(sensor.free_names, self.definitions):
                 raise ValueError(f"sensor {sensor.name!r} uses {STEP!r}, the length of a step, which no measurement has")
+        users = (*self.dynamics, *(name for sensor in self.sensors for name in sorted(sensor.free_names)))
+        for name in unused(self.definitions, users):
+            raise ValueError(f"definition {name!r} is used by no equation")
 
     def __hash__(self) -> int:
         return self._hash
@@ -205,7 +221,7 @@ class Model:
 
     @cached_property
     def _numbers(self) -> dict[str, tuple[str, ...]]:
-        taken = {*self.moving, *self.parameter_names, TIME}
+        taken = {*self.moving, *self.parameter_names, TIME, *(name for name, _ in self.definitions)}
         return {sensor.name: tuple(sorted(sensor.free_names - taken)) for sensor in self.sensors}
 
     def unit(self, name: str) -> str:

@@ -7,27 +7,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, get_args
 
-from piazzi.expressions import from_sympy, is_name, names
+from piazzi.model.definitions import definitions_of, needed, unused
+from piazzi.model.naming import name_of, text_of
 
 Role = Literal["fixed", "estimated", "considered"]
-
-
-def text_of(equation: Any) -> str:
-    """Canonical text of an equation given as text, number or SymPy expression; raises `ExpressionError`."""
-    if isinstance(equation, str):
-        names(equation)
-        return equation.strip()
-    return from_sympy(equation)
-
-
-def name_of(symbol: Any, what: str) -> str:
-    """Name of a SymPy symbol, or the text itself; raises ValueError unless it can name a variable in an equation."""
-    name = str(symbol)
-    if not is_name(name):
-        raise ValueError(
-            f"{what} {name!r} cannot be used as a name: write a letter followed by letters, digits and single underscores"
-        )
-    return name
 
 
 def several(given: Any, what: str) -> tuple[Any, ...]:
@@ -69,6 +52,8 @@ class Sensor:
         Components that are angles in radians: their innovations wrap into (-pi, pi].
     units : mapping of component name to unit, for tables, pictures and columns of files; angles default to "rad".
     number_units : mapping of the sensor's own numbers to units, for those that are estimated
+    definitions : mapping of name to equation
+        Values that the sensor's equations use by name; see `Model`.
 
     Raises
     ------
@@ -81,6 +66,7 @@ class Sensor:
     angles: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     number_units: Any = field(default_factory=dict)
+    definitions: Any = field(default_factory=dict)
     components: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -91,6 +77,7 @@ class Sensor:
         labelled = self._labelled()
         if not labelled:
             raise ValueError(f"sensor {self.name!r} has no equations")
+        put(self, "definitions", definitions_of(self.definitions, f"sensor {self.name!r}"))
         put(self, "components", tuple(labelled))
         put(self, "equations", tuple(labelled.values()))
         units = dict(self.units)
@@ -102,6 +89,8 @@ class Sensor:
         for name in dict(self.number_units):
             if name not in self.free_names:
                 raise ValueError(f"sensor {self.name!r}: number_units names {name!r}, which no equation uses")
+        for name in unused(self.definitions, self.equations):
+            raise ValueError(f"sensor {self.name!r}: definition {name!r} is used by no equation")
         put(self, "number_units", tuple((str(n), str(u)) for n, u in dict(self.number_units).items()))
         put(self, "units", tuple((c, units.get(c, "rad" if c in self.angles else "")) for c in labelled))
 
@@ -132,5 +121,5 @@ class Sensor:
 
     @cached_property
     def free_names(self) -> frozenset[str]:
-        """All names in the equations."""
-        return frozenset().union(*(names(e) for e in self.equations))
+        """All names in the equations that the sensor does not define itself."""
+        return needed(self.equations, self.definitions) - {name for name, _ in self.definitions}

@@ -60,7 +60,8 @@ def _plain(name: str) -> str:
 
 def _free(name: str, model: Model) -> str:
     """The name, with a number behind it where it is taken."""
-    taken = {*model.moving, *model.parameter_names, *(n for s in model.sensors for n in s.free_names)}
+    taken = {*model.moving, *model.parameter_names, *(name for name, _ in model.definitions)}
+    taken |= {name for sensor in model.sensors for name in (*sensor.free_names, *(d for d, _ in sensor.definitions))}
     return next(n for n in (name, *(f"{name}_{i}" for i in range(2, len(taken) + 3))) if n not in taken)
 
 
@@ -73,7 +74,8 @@ def _extended(model: Model, sensor: Sensor, station: Station, names: Mapping[str
     label = next(n for n in (base, *(f"{base}-{i}" for i in range(2, len(taken) + 3))) if n not in taken)
     equations = {c: _renamed(e, names) for c, e in zip(sensor.components, sensor.equations, strict=True)}
     left = {name: unit for name, unit in units.items() if name not in names}
-    copy = Sensor(label, equations, sensor.angles, dict(sensor.units), left)
+    definitions = {name: _renamed(e, names) for name, e in sensor.definitions}
+    copy = Sensor(label, equations, sensor.angles, dict(sensor.units), left, definitions)
     return replace(model, parameters=(*model.parameters, *constants), sensors=(*model.sensors, copy))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.expressions import evaluate
+from piazzi.model.definitions import with_values
 from piazzi.problem.checks import Array, numeric
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def singular_equation(problem: Problem) -> str:
     """A line naming the first equation without a finite value at the prior mean, or "" where all have one."""
     model = problem.model
     values = dict(zip(model.names, problem.mean, strict=True)) | dict(zip(model.given, problem.given, strict=False))
-    values |= {"t": problem.prior_time or 0.0, "dt": 1.0}
+    values = with_values(values | {"t": problem.prior_time or 0.0, "dt": 1.0}, model.definitions)
     at = ", ".join(f"{k} = {v:g}" for k, v in zip(model.names, problem.mean, strict=True))
     for state, equation in zip(model.states, model.dynamics, strict=True):
         if not np.isfinite(evaluate(equation, values)):
@@ -99,6 +100,7 @@ def singular_equation(problem: Problem) -> str:
     for station in problem.stations:
         sensor = model.sensor(station.sensor)
         for component, equation in zip(sensor.components, sensor.equations, strict=True):
-            if not np.isfinite(evaluate(equation, values | dict(station.numbers))):
+            here = with_values(values | dict(station.numbers), sensor.definitions)
+            if not np.isfinite(evaluate(equation, here)):
                 return f"component {component!r} of station {station.name!r} has no finite value at the prior mean ({at})"
     return ""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from piazzi.expressions import evaluate
 from piazzi.kernels import Kepler
 from piazzi.model import Model, nearest
+from piazzi.model.definitions import with_values
 
 if TYPE_CHECKING:
     from piazzi.problem.problem import Problem
@@ -62,6 +63,7 @@ def departure(model: Model, kepler: Kepler, values: tuple[tuple[str, float], ...
         expected = dict.fromkeys(model.states, 0.0)
         expected |= {s: point[v] for s, v in zip(position, velocity, strict=True)}
         expected |= {v: -strength * point[s] / r**3 for s, v in zip(position, velocity, strict=True)}
+        point = with_values(point, model.definitions)
         for state, equation in zip(model.states, model.dynamics, strict=True):
             found = evaluate(equation, point)
             if not isclose(found, expected[state], rel_tol=1e-12, abs_tol=0.0):

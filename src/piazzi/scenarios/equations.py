@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from piazzi.expressions import check
 from piazzi.model import STEP, TIME, Model, Parameter, Role, Sensor, nearest
-from piazzi.model.sensor import name_of
+from piazzi.model.naming import name_of
 from piazzi.scenarios.faults import shown
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.units import ONE, Unit, Units
@@ -30,6 +30,7 @@ class Physics:
     units: dict[str, Unit] = field(default_factory=dict)
     components: dict[str, dict[str, Unit]] = field(default_factory=dict)
     numbers: dict[str, dict[str, Unit]] = field(default_factory=dict)
+    definitions: dict[str, str] = field(default_factory=dict)
 
     @property
     def estimated(self) -> list[str]:
@@ -61,6 +62,7 @@ def read_physics(file: Table, units: Units) -> Physics:
         return out
     _memory(file.table("memory"), out)
     parameters = _parameters(file.table("parameters"), units, out)
+    out.definitions = _definitions(file.table("definitions"), {*out.units, TIME, *([STEP] if "step" in file else [])}, out)
     dynamics = _dynamics(file, out)
     sensors = [_sensor(name, table, units, out) for name, table in file.table("sensors").tables()]
     out.groups = _groups(file, out)
@@ -69,8 +71,19 @@ def read_physics(file: Table, units: Units) -> Physics:
         with file.faults.at(""):
             equations = tuple(dynamics[s] for s in out.states)
             sound = tuple(s for s in sensors if s is not None)
+            discrete = "step" in file
             out.model = shared(
-                Model(tuple(out.states), equations, sound, tuple(parameters), out.groups, labels, "step" in file, out.memory)
+                Model(
+                    tuple(out.states),
+                    equations,
+                    sound,
+                    tuple(parameters),
+                    out.groups,
+                    labels,
+                    discrete,
+                    out.memory,
+                    out.definitions,
+                )
             )
     return out
 
@@ -164,7 +177,7 @@ def _dynamics(file: Table, out: Physics) -> dict[str, str]:
         file.fault("dynamics", "is missing: give the rate of every state")
         return {}
     table = file.table(key)
-    allowed = {*out.units, TIME, *([STEP] if key == "step" else [])}
+    allowed = {*out.units, *out.definitions, TIME, *([STEP] if key == "step" else [])}
     equations = {state: equation(table, state, allowed) for state in out.states}
     for state in out.states:
         if state not in table:
@@ -172,6 +185,15 @@ def _dynamics(file: Table, out: Physics) -> dict[str, str]:
     if out.states:
         table.finish()
     return equations
+
+
+def _definitions(table: Table, known: Collection[str], out: Physics, hint: str = "") -> dict[str, str]:
+    """Named values of equations, which may use one another."""
+    for name in table.data:
+        if name in out.units:
+            table.fault(name, "is also a state or a parameter: every name has one meaning")
+    allowed = {*known, *table.data}
+    return {name: equation(table, name, allowed, hint) for name in table.data}
 
 
 def equation(table: Table, key: str, allowed: Collection[str], hint: str = "") -> str:
@@ -195,20 +217,24 @@ def _sensor(name: str, table: Table, units: Units, out: Physics) -> Sensor | Non
     numbers = named_units(table, "numbers", units, "number")
     for clash in numbers.keys() & out.units.keys():
         table.fault("numbers", f"names {clash!r}, which is also a state or a parameter")
+    known = {*out.units, *out.definitions, *numbers, TIME}
+    definitions = _definitions(table.table("definitions"), known, out, OWN)
+    for clash in definitions.keys() & (numbers.keys() | out.definitions.keys()):
+        table.fault("definitions", f"names {clash!r}, which has a meaning already")
     components = table.table("components")
     if not components.data:
         table.fault("components", "is missing: a sensor needs at least one equation")
     equations, angles, kinds = {}, [], {}
     for key in components.data:
-        equations[key], kinds[key], angle = _component(components, key, {*out.units, *numbers, TIME}, units)
+        equations[key], kinds[key], angle = _component(components, key, {*known, *definitions}, units)
         angles += [key] if angle else []
     table.finish()
     out.components[name], out.numbers[name] = kinds, numbers
     with table.faults.at(table.path):
         labels = {k: u.label for k, u in kinds.items() if u.label}
-        used = Sensor(name, equations, tuple(angles), labels).free_names
+        used = Sensor(name, equations, tuple(angles), labels, {}, definitions).free_names
         own = {k: u.label for k, u in numbers.items() if u.label and k in used}
-        sensor = Sensor(name, equations, tuple(angles), labels, own)
+        sensor = Sensor(name, equations, tuple(angles), labels, own, definitions)
         for unused in sorted(numbers.keys() - sensor.free_names):
             table.fault("numbers", f"names {unused!r}, which no equation uses{nearest(unused, sorted(sensor.free_names))}")
         return sensor

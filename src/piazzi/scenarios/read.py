@@ -23,8 +23,8 @@ from piazzi.scenarios.truth import read_truth
 from piazzi.scenarios.units import Units
 
 SECTIONS = (
-    "title", "units", "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior",
-    "process_noise", "gauss_markov", "integrator", "manoeuvres", "times", "truth", "picture", "study",
+    "title", "units", "states", "memory", "groups", "definitions", "dynamics", "step", "parameters", "sensors", "stations",
+    "prior", "process_noise", "gauss_markov", "integrator", "manoeuvres", "times", "truth", "picture", "study",
 )  # fmt: skip
 MAX_STEPS = 10**10
 MAX_ROWS = 2 * 10**7

@@ -65,6 +65,7 @@ def _equations(model: Model) -> dict[str, Any]:
         "states": {s: model.unit(s) for s in model.states},
         "memory": dict(model.memory),
         "groups": {g: list(members) for g, members in model.groups},
+        "definitions": dict(model.definitions),
         "step" if model.discrete else "dynamics": dict(zip(model.states, model.dynamics, strict=True)),
         "sensors": {s.name: _sensor(model, s) for s in model.sensors},
     }
@@ -74,6 +75,7 @@ def _sensor(model: Model, sensor: Sensor) -> dict[str, Any]:
     rows = zip(sensor.components, sensor.equations, sensor.is_angle, dict(sensor.units).values(), strict=True)
     return {
         "numbers": dict.fromkeys(model.numbers(sensor), "") | dict(sensor.number_units),
+        "definitions": dict(sensor.definitions),
         "components": {c: {"equation": e, "unit": unit, "angle": angle} for c, e, angle, unit in rows},
     }
 

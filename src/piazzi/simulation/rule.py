@@ -10,6 +10,7 @@ import numpy as np
 from piazzi.expressions import CONSTANTS, check
 from piazzi.expressions.language import Call, Name, Negative, Node, Number, Power, Product, Sum
 from piazzi.expressions.parse import parse
+from piazzi.model.definitions import needed
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 
@@ -48,8 +49,15 @@ class Rule:
         self._names = model.names
         values = {name: actual.parameters[name] for name in model.given}
         self._given = {name: float(v.mean[0]) if isinstance(v, Gaussian) else float(v) for name, v in values.items()}
+        known = {*self._names, *self._given}
+        timeless = [
+            (name, text)
+            for name, text in model.definitions
+            if needed([text], model.definitions) <= known | {n for n, _ in model.definitions}
+        ]
+        self._definitions = [(name, parse(text).tree) for name, text in timeless]
         for text in self._equations:
-            check(text, [*self._names, *self._given])
+            check(text, [*self._names, *self._given, *(name for name, _ in timeless)])
         self._trees = [parse(text).tree for text in self._equations]
 
     def __str__(self) -> str:
@@ -60,6 +68,8 @@ class Rule:
         out = np.ones(len(x), dtype=bool)
         values = {**CONSTANTS, **self._given, **dict(zip(self._names, x.T, strict=True))}
         with np.errstate(all="ignore"):
+            for name, tree in self._definitions:
+                values[name] = _value(tree, values)
             for tree in self._trees:
                 out &= np.asarray(_value(tree, values)) > 0
         return out
