@@ -40,6 +40,7 @@ def warm() -> None:
     import h5py
     import llvmlite.binding
     import numpy.random
+    import pandas
     import rich.console
     import rich.table
     import sympy
@@ -54,7 +55,7 @@ def warm() -> None:
     import piazzi.study.store
     from piazzi.cli import commands
 
-    used = (h5netcdf, h5py, llvmlite, numpy, rich, sympy, piazzi)
+    used = (h5netcdf, h5py, llvmlite, numpy, pandas, rich, sympy, piazzi)
     assert all(used)
     for name in commands.COMMANDS:
         __import__(f"piazzi.cli.{name}")

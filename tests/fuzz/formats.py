@@ -107,16 +107,19 @@ class Format:
         self.last = b""
         folder.mkdir()
         self.prepare(folder)
-        if self.compiled:  # a child finds its kernels in memory
-            for arguments in self.ahead(folder):
-                assert command(arguments)() == 0, arguments
+        for arguments in self.ahead(folder):
+            assert command(arguments)() == 0, arguments
 
     def prepare(self, folder: Path) -> None:
         raise NotImplementedError
 
     def ahead(self, folder: Path) -> list[list[str]]:
-        """Commands that compile what cases need."""
-        return []
+        """Commands whose kernels and imports children find in memory."""
+        (folder / "ahead.toml").write_text(LINE)
+        return [
+            ["estimate", f"{folder}/ahead.toml"],
+            ["observability", f"{folder}/ahead.toml", "--no-twins", "--add", "b=sin(x):sigma=1"],
+        ]
 
     def case(self, rng: random.Random) -> Case:
         raise NotImplementedError
@@ -290,12 +293,11 @@ class Follow(Format):
         self.good.append(b"time,station,bearing\n0,n,1\n1,n,1\n1e3,n,2\n0.5,n,1\n")
 
     def ahead(self, folder: Path) -> list[list[str]]:
-        base = [
+        return [
             ["estimate", f"{folder}/{name}.toml", "--with", estimator, "--follow", f"{folder}/{name}.csv"]
             for name in self.scenarios
             for estimator in LIVE
         ]
-        return [*base]
 
     def case(self, rng: random.Random) -> Case:
         data = self.damaged(rng, CSV_TOKENS)
@@ -353,6 +355,10 @@ class Checkpoint(Format):
             self.outputs.append((name, self.good[-1], out.read_bytes()))
             state.unlink()
             out.unlink()
+
+    def ahead(self, folder: Path) -> list[list[str]]:
+        """Nothing: all that is called was called."""
+        return []
 
     def case(self, rng: random.Random) -> Case:
         name, self_made, out = rng.choice(self.outputs)
@@ -421,6 +427,10 @@ class Study(Format):
     """Shared by the two files of a study: the scenario, its finished store and the log of its runs."""
 
     WORDS = ("study", "a.toml", "--runs", "8", "--with", "ekf", "--chunk", "2", "--workers", "0", "-o", "s.nc", "--resume")
+
+    def ahead(self, folder: Path) -> list[list[str]]:
+        """Nothing: the study that was run is enough."""
+        return []
 
     def prepare(self, folder: Path) -> None:
         from piazzi.study.log import Log

@@ -126,6 +126,8 @@ def test_every_function_of_the_language_has_a_compiled_form_and_a_derivative(fun
         "63.5",
         "2.0",
         "-3.0",
+        "0.0",
+        "-0.0",
     ],
 )
 def test_powers_by_integers_and_halves_are_products(text, exponent):

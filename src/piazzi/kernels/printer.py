@@ -113,6 +113,8 @@ class _Writer:
             if str(base) == "E":
                 return f"exp({self.text(exponent)})"
             return f"pow({self.text(base)}, {self.text(exponent)})"
+        if not twice:
+            return "1.0"  # SymPy keeps x**0.0
         whole, half = divmod(int(twice), 2)
         b = self.atom(base)
         factors = [self.temporary(f"sqrt({b})")] if half else []
