@@ -239,3 +239,54 @@ def test_many_states_at_once():
     r, v = propagate_kepler(x[:, None, :3], x[:, None, 3:], MU, np.array([10.0, 20.0]))
     assert r.shape == v.shape == (3, 2, 3)
     assert_allclose(r[2, 1], propagate_kepler(x[2, :3], x[2, 3:], MU, 20.0)[0], rtol=0)
+
+
+# ---- process noise ---------------------------------------------------------------------------------------------------
+
+
+def integrated(x, dt, Q) -> np.ndarray:
+    """Integral of Phi Q Phi^T to the end of `dt`, by ten nodes of Gauss and Legendre per tenth of the local time scale."""
+    motion, d = orbits.orbit(len(x) // 2, kernels.Kepler()), len(x) // 2
+    nodes, weights = np.polynomial.legendre.leggauss(10)
+    total, at = np.zeros_like(Q), 0.0
+    while at < dt:
+        r, v = np.linalg.norm(x[:d]), np.linalg.norm(x[d:])
+        h = min(0.1 * min(r / v, np.sqrt(r**3 / MU)), dt - at)
+        for node, weight in zip(nodes, weights, strict=True):
+            inside, _ = motion.step(x, h * (1 + node) / 2)
+            _, E = motion.step(inside, dt - at - h * (1 + node) / 2)
+            total += weight * h / 2 * E @ Q @ E.T
+        x, _ = motion.step(x, h)
+        at += h
+    return total
+
+
+@pytest.mark.parametrize("e", [0.0, 0.1, 0.7, 0.95, 1.0, 1.5])
+@pytest.mark.parametrize("dt", [60.0, 600.0, 21600.0])
+def test_noise_over_any_interval(e, dt):
+    """From before periapsis, past it, over as much as six hours: four turns of the circular orbit."""
+    x, Q = orbits.state(2, e, nu=-1.0), np.diag([0.0, 0.0, 1.0, 2.0])
+    problem = orbits.orbit(2, kernels.Kepler(), process_noise=Q, prior=pz.Gaussian(x, np.eye(4)))
+    expected = integrated(x, dt, Q)
+    size = np.sqrt(np.diag(expected))
+    found = pz.predict(problem, problem.prior, 0.0, dt)
+    assert_allclose(found.Q / np.outer(size, size), expected / np.outer(size, size), rtol=0, atol=1e-8)
+    assert np.linalg.eigvalsh(found.Q / np.outer(size, size)).min() > -1e-14
+    assert_allclose(found.mean, problem.step(x, dt)[0], rtol=1e-13)
+
+
+def test_noise_in_parts_is_the_noise_of_the_whole():
+    x, Q = orbits.state(3, 0.6), np.diag([0.0] * 3 + [1.0, 2.0, 3.0])
+    one, many = (
+        pz.predict(orbits.orbit(3, solver, process_noise=Q), pz.Gaussian(x, np.eye(6)), 0.0, 20000.0).Q
+        for solver in (kernels.Kepler(), kernels.Kepler(max_step=50.0))
+    )
+    size = np.sqrt(np.diag(many))
+    assert_allclose(one / np.outer(size, size), many / np.outer(size, size), rtol=0, atol=1e-8)
+
+
+def test_noise_over_more_turns_than_can_be_integrated_is_not_a_number():
+    problem = orbits.orbit(2, kernels.Kepler(max_step=1e-3), process_noise=np.diag([0.0, 0.0, 1.0, 1.0]))
+    predicted = pz.predict(problem, problem.prior, 0.0, 1001.0)
+    assert np.isfinite(predicted.mean).all()
+    assert np.isnan(predicted.Q).all()

@@ -1,4 +1,4 @@
-"""Every method converges at its theoretical order, state and derivative; its derivative is that of the step taken."""
+"""Every method converges at its theoretical order, in state, derivative and noise; its derivative is that of the step taken."""
 
 import mpmath
 import numpy as np
@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi import kernels
+from piazzi.kernels import quadrature, tableaus
 from tests.references import differences
 from tests.solvers import orbits
 
@@ -24,25 +25,30 @@ METHODS = [
 ]
 NAMES = [m[0].__name__ for m in METHODS]
 SPAN = 2.0
+NOISE = np.diag([0.5, 0.0])  # of the angle: with noise of the rate, order 5's leading error changes sign near `SPAN`
 
 
 @pytest.fixture(scope="module")
 def truth():
-    """The driven pendulum after `SPAN` seconds and its derivative by state and constant, by mpmath's Taylor series."""
+    """The driven pendulum after `SPAN` seconds, its derivative and its process noise, by mpmath's Taylor series.
+
+    The noise is the solution of Lyapunov's equation P' = F P + P F^T + Q along the motion, from P = 0.
+    """
     k, x = 2, [0.4, -0.3, 0.2]
     with mpmath.workdps(20):
 
         def rate(t, y):
-            """State, then the columns of its derivative by q, w and c: those of q' = w, w' = -k sin q - c w + ..."""
+            """State; columns of its derivative by q, w and c, those of q' = w, w' = -k sin q - c w + ...; P as qq, qw, ww."""
             q, w, c = y[0], y[1], mpmath.mpf(x[2])
             out = [w, -k * mpmath.sin(q) - c * w + mpmath.exp(-t) * mpmath.cos(3 * t)]
             for i in (2, 4, 6):
                 out += [y[i + 1], -k * mpmath.cos(q) * y[i] - c * y[i + 1] - (w if i == 6 else 0)]
-            return out
+            a, (qq, qw, ww) = -k * mpmath.cos(q), y[8:]
+            return [*out, 2 * qw + NOISE[0, 0], ww + a * qq - c * qw + NOISE[0, 1], 2 * (a * qw - c * ww) + NOISE[1, 1]]
 
-        start = [mpmath.mpf(v) for v in (*x[:2], 1, 0, 0, 1, 0, 0)]
+        start = [mpmath.mpf(v) for v in (*x[:2], 1, 0, 0, 1, 0, 0, 0, 0, 0)]
         y = np.array([float(v) for v in mpmath.odefun(rate, 0, start, tol=mpmath.mpf("1e-16"))(SPAN)])
-    return np.array(x), y[:2], y[2:].reshape(3, 2).T
+    return np.array(x), y[:2], y[2:8].reshape(3, 2).T, y[[8, 9, 9, 10]].reshape(2, 2)
 
 
 def order_seen(error) -> float:
@@ -61,7 +67,7 @@ def order_seen(error) -> float:
 
 @pytest.mark.parametrize(("method", "order"), METHODS, ids=NAMES)
 def test_error_falls_with_the_power_of_the_order(method, order, truth):
-    x, after, _ = truth
+    x, after, _, _ = truth
 
     def error(n):
         return np.abs(orbits.driven(method(n)).step(x, SPAN)[0][:2] - after).max()
@@ -71,7 +77,7 @@ def test_error_falls_with_the_power_of_the_order(method, order, truth):
 
 @pytest.mark.parametrize(("method", "order"), METHODS, ids=NAMES)
 def test_error_of_the_derivative_falls_with_it(method, order, truth):
-    x, _, derivative = truth
+    x, _, derivative, _ = truth
 
     def error(n):
         return np.abs(orbits.driven(method(n)).step(x, SPAN)[1][:2] - derivative).max()
@@ -79,15 +85,45 @@ def test_error_of_the_derivative_falls_with_it(method, order, truth):
     assert order_seen(error) == pytest.approx(order, abs=0.2)
 
 
+def noise_error(solver, truth) -> float:
+    x, _, _, noise = truth
+    problem = orbits.driven(solver, process_noise=NOISE)
+    return float(np.linalg.norm(pz.predict(problem, pz.Gaussian(x[:2], np.eye(2)), 0.0, SPAN).Q[:2, :2] - noise))
+
+
+@pytest.mark.parametrize(("method", "order"), METHODS, ids=NAMES)
+def test_error_of_the_noise_falls_with_it(method, order, truth):
+    assert order_seen(lambda n: noise_error(method(n), truth)) == pytest.approx(order, abs=0.2)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_error_of_adaptive_noise_keeps_to_the_tolerance(rtol, truth):
+    assert noise_error(kernels.DormandPrince(rtol, rtol), truth) < 10 * rtol
+
+
+@pytest.mark.parametrize(("order", "degree"), [(6, 5), (8, 7), (10, 9)])
+def test_rules_integrate_polynomials_up_to_their_order(order, degree):
+    """The defining property: x^m has the mean 1 / (m + 1) on [0, 1] for m below the order, and not beyond."""
+    nodes, weights = map(np.array, quadrature.lobatto(order))
+    off = [abs(weights @ nodes**m - 1 / (m + 1)) for m in range(order + 1)]
+    assert max(off[: degree + 1]) < 3e-16
+    assert off[order] > 1e-8
+    assert weights.min() > 0
+    assert (nodes[0], nodes[-1]) == (0.0, 1.0)
+
+
 def test_a_user_s_tableau_has_its_own_order(truth):
-    """Kutta's method of order 3, given as numbers."""
-    x, after, _ = truth
+    """Kutta's method of order 3, given as numbers; in the noise too, and so has one of order 5 in six stages."""
+    x, after, _, _ = truth
     method = {"a": [[], [0.5], [-1, 2]], "b": [1 / 6, 2 / 3, 1 / 6]}
 
     def error(n):
         return np.abs(orbits.driven(pz.RungeKutta(**method, substeps=n)).step(x, SPAN)[0][:2] - after).max()
 
     assert order_seen(error) == pytest.approx(3, abs=0.2)
+    assert order_seen(lambda n: noise_error(pz.RungeKutta(**method, substeps=n), truth)) == pytest.approx(3, abs=0.2)
+    a, b, c = tableaus.DORMAND_PRINCE_5
+    assert order_seen(lambda n: noise_error(pz.RungeKutta(a, b, c, substeps=n), truth)) == pytest.approx(5, abs=0.2)
 
 
 SOLVERS = [

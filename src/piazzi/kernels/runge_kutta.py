@@ -7,6 +7,7 @@ from typing import Any
 
 from piazzi.kernels import tableaus
 from piazzi.kernels.integrators import Integrator
+from piazzi.kernels.quadrature import noise_order
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,10 @@ class ExplicitRungeKutta(Integrator):
     @property
     def scheme(self) -> tuple[Any, ...]:
         return ("runge-kutta", self.tableau)
+
+    @property
+    def noise_fragments(self) -> tuple[str, ...]:
+        return ("noise_integral",) if noise_order(len(self.tableau[1])) == 4 else ("noise_lobatto", "noise_steps")
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from piazzi.kernels.integrators import Kepler
+from piazzi.kernels.quadrature import noise_order, rule_source
 from piazzi.kernels.tableaus import DORMAND_PRINCE_8, ERROR_3, ERROR_5, Row
 from piazzi.model import Model
 
 MOST_INLINED = 6  # stages
+PANEL = 0.6  # of the time in which gravity or motion turns the orbit: 0.42 rad of a circular one
+MAX_PANELS = 1_000_000  # in one interval: 150,000 turns of a circular orbit
 
 
 def inline_source(head: str, *lines: str, mark: str = "inline") -> str:
@@ -37,39 +40,47 @@ def runge_kutta_source(a: Sequence[Row], weights: Row, nodes: Row) -> str:
     alone.append(f"return {_combination('x', 'k', weights)}")
     both.append(f"return {_combination('x', 'k', weights)}, {_combination('R', 'K', weights)}")
     step, jacobian = "substep(t, h, x, p)", "substep_jacobian(t, h, x, R, p)"
-    return inline_source(step, *alone, mark=mark) + inline_source(jacobian, *both, mark=mark)
+    rule = rule_source(noise_order(len(weights)))
+    return rule + inline_source(step, *alone, mark=mark) + inline_source(jacobian, *both, mark=mark)
 
 
 def adaptive_source(model: Model, rtol: float, atol: float, max_steps: int) -> str:
-    """The steps of order 8, and ``trial``: such a step with its error in units of the tolerance.
-
-    The estimates of order 5 and 3 are combined as by Hairer, Norsett and Wanner (1993), II.10.
-    """
+    """``trial``, ``trial_jacobian``: a step of order 8 and its error in units of the tolerance, alone and with derivative."""
     a, weights, nodes = DORMAND_PRINCE_8
-    lines = []
+    stages, both, error = [], [], []
     for i, (row, c) in enumerate(zip(a, nodes, strict=True)):
-        lines.append(f"k{i} = dynamics({f't + {c!r}*h' if c else 't'}, {_combination('x', 'k', row)}, p)")
-    lines.append(f"y = {_combination('x', 'k', weights)}")
-    lines.append(f"e5 = {_combination('', 'k', ERROR_5, '')}")
-    lines.append(f"e3 = {_combination('', 'k', ERROR_3, '')}")
-    for i, group in enumerate(_together(model)):
+        t, x = f"t + {c!r}*h" if c else "t", _combination("x", "k", row)
+        stages.append(f"k{i} = dynamics({t}, {x}, p)")
+        both.append(f"k{i}, K{i} = rhs({t}, {x}, {_combination('R', 'K', row)}, p)")
+    for v, k in (("y", "x"), ("S", "R")):
+        (stages if v == "y" else both).append(f"{v} = {_combination(k, 'k' if v == 'y' else 'K', weights)}")
+    both.append(stages[-1])
+    groups = _together(model)
+    for i, group in enumerate(groups):
         before, after = (" + ".join(f"{v}[{j}]*{v}[{j}]" for j in group) for v in "xy")
-        lines.append(f"w{i} = 1.0 / maximum({atol!r} + {rtol!r} * sqrt(maximum({before}, {after})), 1e-300)")
+        error.append(f"w{i} = 1.0 / maximum(ATOL + RTOL * sqrt(maximum({before}, {after})), 1e-300)")
         for j in group:
-            lines.append(f"u{j}, v{j} = w{i} * e5[{j}], w{i} * e3[{j}]")
-    nd = range(len(model.states))
-    lines.append(f"fifth = {' + '.join(f'u{j}*u{j}' for j in nd)}")
-    lines.append(f"third = {' + '.join(f'v{j}*v{j}' for j in nd)}")
-    lines.append(f"return y, fabs(h) * fifth / sqrt({float(len(nd))!r} * maximum(fifth + 0.01 * third, 1e-300))")
-    steps = runge_kutta_source(a, weights, nodes)
-    return f"MAX_STEPS = {max_steps}\n\n\n" + steps + inline_source("trial(t, h, x, p)", *lines, mark="outlined")
+            error.append(f"u{j}, v{j} = w{i} * e5[{j}], w{i} * e3[{j}]")
+    sums = [" + ".join(f"{u}{j}*{u}{j}" for j in range(len(model.moving))) for u in "uv"]
+    embedded = [f"e{q} = {_combination('', 'k', e, '')}" for q, e in ((5, ERROR_5), (3, ERROR_3))]
+    error = [*embedded, *error, f"error = combined_error(h, {sums[0]}, {sums[1]})"]
+    matrix = [f"E{q} = {_combination('', 'K', e, '')}" for q, e in ((5, ERROR_5), (3, ERROR_3))]
+    matrix += ["off = matrix_error(h, R, S, E5, E3)", "return y, S, off if not off <= error else error"]
+    member = tuple(next(g for g, group in enumerate(groups) if j in group) for j in range(len(model.moving)))
+    return (
+        f"MAX_STEPS = {max_steps}\nRTOL = {rtol!r}\nATOL = {atol!r}\nGROUP = {member!r}\n"
+        + rule_source(10)
+        + inline_source("trial(t, h, x, p)", *stages, *error, "return y, error", mark="outlined")
+        + inline_source("trial_jacobian(t, h, x, R, p)", *both, *error, *matrix, mark="outlined")
+        + inline_source("substep_jacobian(t, h, x, R, p)", "y, S, _ = trial_jacobian(t, h, x, R, p)", "return y, S")
+    )
 
 
 def _together(model: Model) -> list[list[int]]:
     """States whose lengths are measured together: those of a group (of the smallest, where there are several)."""
     groups = sorted((members for _, members in model.groups), key=len)
     seen: dict[tuple[str, ...], list[int]] = {}
-    for j, state in enumerate(model.states):
+    for j, state in enumerate(model.moving):
         seen.setdefault(next((g for g in groups if state in g), (state,)), []).append(j)
     return list(seen.values())
 
@@ -101,15 +112,20 @@ def kepler_source(model: Model, mu: str | float, position: Any, velocity: Any) -
     if mu in model.names:
         by_beta[model.names.index(mu)], by_mu[model.names.index(mu)] = "2.0/r0", "1.0"
     change = ", ".join(f"vector({', '.join(row)})" for row in (by_r0, by_sigma0, by_beta, by_mu))
-    return inline_source(
-        "substep(t, h, x, p)", *head, f"F, G, Ft, Gt = kepler_motion{call}", f"return vector({', '.join(new)})"
-    ) + inline_source(
-        "substep_jacobian(t, h, x, R, p)",
-        *head,
-        f"F, G, Ft, Gt, dF, dG, dFt, dGt = kepler_partials{call}",
-        f"change = matrix({change})",
-        "DF, DG, DFt, DGt = dF @ change, dG @ change, dFt @ change, dGt @ change",
-        f"return vector({', '.join(new)}), matrix({', '.join(rows)}) @ complete(R)",
+    reach = [*head[:1], f"return {PANEL!r} / sqrt({m}/(r0*r0*r0) + ({dot['vv']})/(r0*r0))"]
+    return (
+        f"MAX_PANELS = {MAX_PANELS}\n"
+        + rule_source(10)
+        + inline_source("panel(x, p)", *reach)
+        + inline_source("substep(t, h, x, p)", *head, f"F, G, Ft, Gt = kepler_motion{call}", f"return vector({', '.join(new)})")
+        + inline_source(
+            "substep_jacobian(t, h, x, R, p)",
+            *head,
+            f"F, G, Ft, Gt, dF, dG, dFt, dGt = kepler_partials{call}",
+            f"change = matrix({change})",
+            "DF, DG, DFt, DGt = dF @ change, dG @ change, dFt @ change, dGt @ change",
+            f"return vector({', '.join(new)}), matrix({', '.join(rows)}) @ complete(R)",
+        )
     )
 
 

@@ -22,6 +22,14 @@ NUMBERS: int
 LANES: int
 GIVEN: int
 MAX_STEPS: int
+MAX_PANELS: int
+RTOL: float
+ATOL: float
+GROUP: tuple[int, ...]
+GAPS: int
+GAP: tuple[float, ...]
+NODE: tuple[float, ...]
+WEIGHT: tuple[float, ...]
 
 
 # written by generate.py
@@ -30,6 +38,8 @@ rhs: Any
 substep: Any
 substep_jacobian: Any
 trial: Any
+trial_jacobian: Any
+panel: Any
 orbit_axes: Any
 first_rows: Any
 identity_rows: Any
@@ -43,6 +53,9 @@ innovate_lanes: Any
 coast: Any
 coast_jacobian: Any
 coast_noise: Any
+carry_noise: Any
+combined_error: Any
+matrix_error: Any
 noise_in_axes: Any
 resized: Any
 manoeuvre: Any

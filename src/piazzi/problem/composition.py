@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from piazzi.kernels import DormandPrince
-
 if TYPE_CHECKING:
     from piazzi.problem.problem import Problem
 
@@ -21,13 +19,12 @@ def composed(problem: Problem, fragments: tuple[str, ...], lanes: int) -> tuple[
     assert integrator is not None
     events = "_manoeuvres" if problem.manoeuvres else ""
     axes = "axes_orbit" if problem.process_noise.axes == "orbit" else "axes"
-    integral = "noise_adaptive" if isinstance(integrator, DormandPrince) else "noise_integral"
     together = integrator.in_lanes and not events and lanes > 1
     linearize = "linearize_integral" if problem.noise_varies else "linearize_scaled" if together else "linearize_each"
     parts = {
         "transition": ("matrices", *integrator.fragments, f"transition{events}"),
         "noise_scaled": (axes, "noise_scaled", f"advance{events}"),
-        "noise_integral": (axes, integral, f"advance{events}"),
+        "noise_integral": (axes, *integrator.noise_fragments, f"advance{events}"),
         "linearize_scaled": (linearize,),
         "chain_noise_scaled": (f"chain_noise_{'integral' if problem.noise_varies else 'scaled'}",),
     }
