@@ -77,3 +77,23 @@ def test_what_killed_writers_left_is_swept(tmp_path):
         (tmp_path / name).write_text("x")
     sweep(tmp_path / "s.nc")
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([".s-abcd_123.csv", ".t-abcd_123.nc", ".s-short.nc", "s.nc"])
+
+
+def test_the_mask_of_other_threads_is_left_alone(tmp_path, monkeypatch):
+    """To ask for it is to set it, for the whole process: a file that another thread makes then is open to everybody."""
+
+    def forbidden(mask):
+        raise AssertionError("the mask of the process was touched")
+
+    monkeypatch.setattr(os, "umask", forbidden)
+    with atomic_path(tmp_path / "new") as work:
+        work.write_text("")
+    (tmp_path / "usual").write_text("")
+    assert (tmp_path / "new").stat().st_mode == (tmp_path / "usual").stat().st_mode
+
+
+def test_what_replaces_a_private_file_is_private_while_it_is_written(tmp_path):
+    (tmp_path / "old").write_text("")
+    (tmp_path / "old").chmod(0o600)
+    with atomic_path(tmp_path / "old") as work:
+        assert stat.S_IMODE(work.stat().st_mode) == 0o600

@@ -15,6 +15,7 @@ import time
 import pytest
 
 import piazzi
+from piazzi.study import cluster as cluster_module
 from piazzi.study import run_study, same_results
 from piazzi.study.cluster import CONNECT_SECONDS, Cluster
 from piazzi.study.pieces import run_task
@@ -194,9 +195,40 @@ def test_killed_worker_and_killed_scheduler(tmp_path):
     assert done.stdout == ""
     assert f"the scheduler at {address} is gone" in done.stderr.splitlines()[-1]
     assert re.search(r"\d+ of 600 runs are kept beside", done.stderr)
+    assert "distributed" not in done.stderr
     again = subprocess.run([*program, "-o", path, "--resume"], capture_output=True, text=True)
     assert again.returncode == 0, again.stderr
     assert same_results(tmp_path / "whole.nc", path) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("when", ["between tasks", "while a task runs", "before workers are asked"])
+def test_stalled_scheduler_is_given_up(tmp_path, when, monkeypatch):
+    """It is stopped, as one is that a network swallows: connections are made, and nothing is ever said."""
+    silence = 2.0
+    with cluster(tmp_path, workers=1) as (address, (scheduler, worker)):
+        if when == "before workers are asked":
+            connect = cluster_module._client
+            stop = lambda address: (connect(address), os.kill(scheduler.pid, signal.SIGSTOP))[0]  # noqa: E731
+            monkeypatch.setattr(cluster_module, "_client", stop)
+            with pytest.raises(ConnectionError, match="not answered for 2 s"):
+                Cluster(small(), address, None, silence)
+            os.kill(scheduler.pid, signal.SIGCONT)
+            return
+        team = Cluster(small(), address, None, silence)
+        try:
+            os.kill(worker.pid, signal.SIGSTOP)
+            if when == "while a task runs":
+                team.submit(Task(0, 0, 8))
+            os.kill(scheduler.pid, signal.SIGSTOP)
+            started = time.monotonic()
+            with pytest.raises(ConnectionError, match=rf"{address} has not answered for 2 s; what was finished is kept"):
+                team.wait() if when == "while a task runs" else team.slots
+            assert time.monotonic() - started < silence + 3 * CONNECT_SECONDS + BUSY_MACHINE
+        finally:
+            team.close()
+            for process in (scheduler, worker):
+                os.kill(process.pid, signal.SIGCONT)
 
 
 @pytest.mark.parametrize("losses", [1, 0])

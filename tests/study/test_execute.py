@@ -14,10 +14,12 @@ import pytest
 
 from piazzi.present.studies import failures
 from piazzi.study import execute, pieces, pool, read_store, run_study, same_results, versions
+from piazzi.study.log import Log
 from piazzi.study.pool import Processes
 from piazzi.study.runner import RETRIES
 from piazzi.study.runs import simulated
-from piazzi.study.tasks import Task
+from piazzi.study.tasks import Piece, Task
+from piazzi.study.versions import fingerprint
 from tests.study.estimators import Poison
 from tests.study.studies import small
 
@@ -281,3 +283,18 @@ def _alive(pid):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+@pytest.mark.parametrize(
+    "task", [(0, int(8e100), 4), (0, 0, 10**30), (7, 0, 4), (0, 58, 4), (0, -4, 4), (0.0, 0, 4), ("0", 0, 4)]
+)
+def test_runs_that_are_none_of_the_study_are_run_again(whole, tmp_path, task):
+    """Whatever a log says with a sound checksum: a first run of 8e100 made a study of twelve go on for ever."""
+    study, expected = whole
+    path = tmp_path / "s.nc"
+    assert (study.points, study.runs) == (2, 60)
+    log = Log.create(tmp_path / "s.nc.runs", study.specification | {"versions": fingerprint()})
+    log.append(Piece(Task(*task), {"nonsense": np.zeros((1, 4))}))
+    log.close()
+    run_study(study, path, workers=0, resume=True)
+    assert same_results(expected, path) == []

@@ -1,8 +1,14 @@
 """The file of finished runs: whole records or none, whatever ends the process or fills the disk."""
 
 import errno
+import hashlib
+import json
 import os
+import resource
 import shutil
+import struct
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -147,3 +153,65 @@ def test_a_really_full_disk(monkeypatch, tmp_path):
     with pytest.raises(OSError):
         Log.create(path, SPECIFICATION)
     assert shutil.disk_usage(tmp_path).total > 0
+
+
+def test_windows_closes_before_it_removes(path, monkeypatch):
+    """There, a file that is open cannot be removed (WinError 32)."""
+    log, unlink = Log.open(path), type(path).unlink
+
+    def unlink_as_windows_does(self, missing_ok=False):
+        if not log._file.closed:
+            raise PermissionError(13, "The process cannot access the file because it is being used by another process")
+        unlink(self, missing_ok=missing_ok)
+
+    monkeypatch.setattr(type(path), "unlink", unlink_as_windows_does)
+    log.remove()
+    assert not path.exists()
+
+
+def test_windows_lock_keeps_others_out(path, monkeypatch):
+    """Without fcntl: a byte far behind the end is locked, and the file is read from its start."""
+    locked = set()
+
+    def locking(handle, mode, count):
+        at = os.lseek(handle, 0, os.SEEK_CUR)
+        assert (mode, count) == (2, 1)
+        assert os.fstat(handle).st_size < at < 2**31
+        if at in locked:
+            raise PermissionError(13, "Permission denied")
+        locked.add(at)
+
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    monkeypatch.setitem(sys.modules, "msvcrt", SimpleNamespace(locking=locking, LK_NBLCK=2))
+    log = Log.open(path)
+    assert [entry.task.first for entry in log.entries] == [0, 3, 6]
+    with pytest.raises(ValueError, match="another process is running this study"):
+        Log.open(path)
+    log.close()
+
+
+def test_systems_without_locks_do_without(path, monkeypatch):
+    for name in ("fcntl", "msvcrt"):
+        monkeypatch.setitem(sys.modules, name, None)
+    log = Log.open(path)
+    assert len(log.entries) == 3
+    log.close()
+
+
+def test_a_record_full_of_holes_is_looked_at_in_parts(path):
+    """It declares a gigabyte, and the file has no byte of it on disk."""
+    size = 2**30
+    checksum = hashlib.sha256()
+    header = json.dumps({"task": [1, 9, 1], "arrays": [], "messages": []}).encode()
+    checksum.update(struct.pack("<Q", len(header)) + header)
+    for _ in range(size >> 20):
+        checksum.update(bytes(2**20))
+    with open(path, "ab") as file:
+        file.write(struct.pack("<8sQ32s", b"PZRUNS1\n", 8 + len(header) + size, checksum.digest()))
+        file.write(struct.pack("<Q", len(header)) + header)
+        file.truncate(file.tell() + size)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    log = Log.open(path)
+    assert [entry.task.first for entry in log.entries] == [0, 3, 6, 9]
+    log.close()
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 2**18  # KiB

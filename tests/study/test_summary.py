@@ -3,6 +3,7 @@
 import json
 import shutil
 
+import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -148,3 +149,20 @@ def test_any_netcdf_reader_opens_a_store(stored):
         assert found["rmse"].dims == ("point", "row", "run", "group")
         assert found["error"].dims == ("point", "row", "run", "epoch", "group")
         assert_allclose(found["rmse"].values[1, 2], expected)
+
+
+def test_absurd_shapes_are_refused_before_memory_is_asked_for(stored, tmp_path):
+    """A file of some kilobytes that declares 3e8 runs asked for ten gigabytes."""
+    small_file = tmp_path / "bomb.nc"
+    with h5py.File(stored.path) as source, h5py.File(small_file, "w") as file:
+        for name, data in source.items():
+            shape = list(data.shape)
+            if data.ndim >= 3 and not name.startswith("bound"):
+                shape[2] = 300_000_000
+                chunks = (1, 1, 4096, *shape[3:])
+                file.create_dataset(name, shape=shape, dtype=data.dtype, chunks=chunks, fillvalue=data.fillvalue)
+            else:
+                file.create_dataset(name, data=data[()])
+    assert small_file.stat().st_size < 100_000
+    with pytest.raises(ValueError, match=r"bomb.nc: variable 'seconds' would take 2,400,000,000 bytes, absurd"):
+        read_store(small_file).summary.lines  # noqa: B018

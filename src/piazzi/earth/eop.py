@@ -17,6 +17,7 @@ import numpy as np
 
 from piazzi.earth import scales
 from piazzi.earth.delta_t import MODEL, delta_t, delta_t_error
+from piazzi.sources import opened
 
 Array = np.ndarray[Any, Any]
 
@@ -190,7 +191,8 @@ def read_eop(path: str | Path) -> EOPTable:
     Raises ValueError with the file and the line where a value cannot be read, and OSError where the file cannot be opened.
     """
     path = Path(path)
-    lines = path.read_bytes().splitlines()
+    with opened(path) as file:
+        lines = file.read().splitlines()
     if any(b"C04" in line for line in lines[:20]):
         return _c04(lines, path)
     if lines and len(lines[0]) >= 187 and _number(lines[0][7:15]):

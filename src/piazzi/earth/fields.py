@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piazzi.earth.epoch import Epoch
+from piazzi.sources import opened
 
 Array = np.ndarray[Any, Any]
 
@@ -156,7 +157,8 @@ def read_gravity(path: str | Path) -> GravityField:
     lacks GM, radius or degree, or where the file ends before its degree.
     """
     path = Path(path)
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    with opened(path) as file:
+        lines = file.read().decode("utf-8", errors="replace").splitlines()
     ends = [i for i, line in enumerate(lines) if line.lower().startswith("end_of_head")]
     if ends:
         return _icgem(path, lines, ends[0])

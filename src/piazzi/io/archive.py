@@ -15,6 +15,7 @@ import numpy as np
 
 from piazzi.model import nearest
 from piazzi.problem.checks import Array
+from piazzi.sources import opened
 
 # An archive may hold this much, or this many times its own size if that is more: real measurements do not shrink further.
 FREE_BYTES = 64 * 2**20
@@ -35,7 +36,7 @@ def read_arrays(path: str | os.PathLike[str], keys: Sequence[str], required: Col
         Where it is not an archive of plain numeric arrays, lacks a required key, or would take absurdly much memory.
     """
     name = os.fspath(path)
-    with open(path, "rb") as file:
+    with opened(path) as file:
         size = os.fstat(file.fileno()).st_size
         try:
             with zipfile.ZipFile(file) as archive:

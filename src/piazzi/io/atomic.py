@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import shutil
 import stat
 import tempfile
@@ -16,7 +17,7 @@ from pathlib import Path
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary name in the folder of `path`, moved to `path` when the block ends well, and removed when it does not.
 
-    A link is followed; what is no regular file (a pipe, /dev/null) is written to, not replaced.
+    A link is followed; a device (/dev/null) is written to, not replaced; a pipe is refused, because nobody may read it.
 
     Raises
     ------
@@ -26,11 +27,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     check_writable(path)
     special = _is_special(path)
     target = Path(path if special else os.path.realpath(path))
-    handle, name = tempfile.mkstemp(
-        prefix=f".{target.stem[:40]}-", suffix=target.suffix[-40:], dir=None if special else target.parent
-    )
-    os.close(handle)
-    work = Path(name)
+    work = _temporary(target) if special else _beside(target)
     try:
         yield work
         if special:
@@ -57,6 +54,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     """Return nothing if a file can be written at `path`; raise OSError, saying why, if not.  Nothing is changed."""
     name, target = os.fspath(path), Path(os.path.realpath(path))
     if _is_special(path):
+        if stat.S_ISFIFO(os.stat(path).st_mode) or stat.S_ISSOCK(os.stat(path).st_mode):
+            raise OSError(f"cannot write {name}: it is a pipe, not a file")
         if not os.access(path, os.W_OK):
             raise PermissionError(f"cannot write {name}: no permission")
     elif target.is_dir() or not target.name:
@@ -72,15 +71,30 @@ def _is_special(path: str | os.PathLike[str]) -> bool:
     return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
 
 
+def _temporary(target: Path) -> Path:
+    """A new, private file with the same ending."""
+    handle, name = tempfile.mkstemp(suffix=target.suffix[-40:])
+    os.close(handle)
+    return Path(name)
+
+
+def _beside(target: Path) -> Path:
+    """A new file in the same folder: private if it is to replace one, else with the permissions of all new files there.
+
+    It gets those by being opened as any file is: to ask for the mask is to change it for a moment, in all threads.
+    """
+    mode = 0o600 if target.exists() else 0o666
+    while True:
+        work = target.with_name(f".{target.stem[:40]}-{secrets.token_hex(4)}{target.suffix[-40:]}")
+        with suppress(FileExistsError):
+            os.close(os.open(work, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
+            return work
+
+
 def _settle(work: Path, target: Path) -> None:
-    """Give the finished file the permissions of the one it replaces, or the usual ones, and move it there."""
+    """Give the finished file the permissions of the one it replaces, if it does, and move it there."""
     if target.exists():
-        mode = stat.S_IMODE(target.stat().st_mode)
-    else:
-        mask = os.umask(0)
-        os.umask(mask)
-        mode = 0o666 & ~mask
-    os.chmod(work, mode)
+        os.chmod(work, stat.S_IMODE(target.stat().st_mode))
     with open(work, "rb+") as file:
         os.fsync(file.fileno())
     os.replace(work, target)

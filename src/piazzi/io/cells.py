@@ -13,6 +13,7 @@ import numpy as np
 
 from piazzi.problem.checks import Array
 from piazzi.scenarios.faults import shown
+from piazzi.sources import opened
 
 STATION = "station"
 MAX_BYTES = 2**32
@@ -52,7 +53,7 @@ def read_cells(path: str | os.PathLike[str]) -> Cells:
     ValueError
         Where it is no table of numbers: with the line, the column and the cell.
     """
-    with open(path, "rb") as file:
+    with opened(path) as file:
         size = os.fstat(file.fileno()).st_size
         if size > MAX_BYTES:
             raise ValueError(f"it has {size:,} bytes; at most {MAX_BYTES:,} are read")
@@ -63,17 +64,18 @@ def read_cells(path: str | os.PathLike[str]) -> Cells:
     rest = content.removeprefix(b"\xef\xbb\xbf")
     rest = rest.replace(b"\r\n", b"\n") if b"\r" in rest else rest
     comments: list[str] = []
-    line = 0
-    while rest:
+    line = start = 0
+    while start < len(rest):
         line += 1
-        first, _, rest = rest.partition(b"\n")
+        end = rest.find(b"\n", start)
+        end = len(rest) if end < 0 else end
+        first, start = rest[start:end], end + 1
         if first.startswith(b"#"):
             comments.append(_decoded(first[1:], line).strip())
         elif first.strip():
-            header = parse_header(first, line)
-            rest = rest.rstrip(b"\n")
-            table = (rest, line + 1, header, tuple(comments))
-            return (fast(*table) if len(rest) >= SMALL else None) or parse_rows(*table)
+            header, body = parse_header(first, line), rest[start:].rstrip(b"\n")
+            table = (body, line + 1, header, tuple(comments))
+            return (fast(*table) if len(body) >= SMALL else None) or parse_rows(*table)
     raise ValueError("the file is empty: no line names its columns")
 
 

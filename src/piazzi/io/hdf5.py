@@ -6,12 +6,14 @@ import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import prod
 from typing import Any
 
 import numpy as np
 
 from piazzi.problem.checks import Array
 from piazzi.scenarios.faults import one_line
+from piazzi.sources import opened as opened_file
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 # A data set may hold this much, or this many times its size in the file if that is more
@@ -30,7 +32,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
         Where the file cannot be read.
     """
     name = os.fspath(path)
-    with open(path, "rb") as file:
+    with opened_file(path) as file:
         start = file.read(8)
     if start != SIGNATURE:
         what = {b"": "is empty", b"CDF": "is classic NetCDF; NetCDF-4 is needed"}.get(start[:3], "is not a NetCDF-4 file")
@@ -78,8 +80,9 @@ def slab(group: Any, name: str, index: tuple[int | slice, ...]) -> Array:
     data = _variable(group, name, True)
     if data.dtype.kind not in "biuf" or data.ndim < len(index):
         raise ValueError(f"variable {name!r} is not an array of numbers with {len(index)} dimensions")
-    out = data[index]
-    return np.asarray(out)
+    whole = [1 if isinstance(i, int) else len(range(*i.indices(n))) for i, n in zip(index, data.shape, strict=False)]
+    _check_size(data, name, data.dtype.itemsize, prod([*whole, *data.shape[len(index) :]]))
+    return np.asarray(data[index])
 
 
 def document(group: Any, name: str) -> dict[str, Any]:
@@ -127,7 +130,11 @@ def _variable(group: Any, name: str, required: bool) -> Any:
     return data
 
 
-def _check_size(data: Any, name: str, itemsize: int) -> None:
-    size, limit = int(data.size) * itemsize, max(FREE_BYTES, EXPANSION * data.id.get_storage_size())
+def _check_size(data: Any, name: str, itemsize: int, count: int | None = None) -> None:
+    """Raise where numbers, all or so many of them, take more memory than the file can have meant."""
+    size, limit = (
+        (int(data.size) if count is None else count) * itemsize,
+        max(FREE_BYTES, EXPANSION * data.id.get_storage_size()),
+    )
     if size > limit:
         raise ValueError(f"variable {name!r} would take {size:,} bytes, absurd for what the file holds (limit {limit:,})")

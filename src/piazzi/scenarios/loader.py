@@ -13,6 +13,7 @@ from piazzi.model import nearest
 from piazzi.scenarios.faults import Fault, Faults, ScenarioError, shown
 from piazzi.scenarios.read import read_scenario
 from piazzi.scenarios.scenario import Scenario
+from piazzi.sources import opened
 
 FILES = Path(__file__).parent / "files"
 TEMPLATE = "template"
@@ -90,7 +91,7 @@ def _read(path: Path) -> tuple[Scenario | None, list[Fault]]:
 
 def _tables(path: Path, faults: Faults) -> dict[str, Any]:
     """The file as plain tables; a fault where it is no TOML."""
-    with open(path, "rb") as file:
+    with opened(path) if path.suffix == ".toml" else open(path, "rb") as file:  # <(...) of a shell is a pipe, without ending
         content = file.read(MAX_BYTES + 1)
     if len(content) > MAX_BYTES:
         faults.add("", f"is longer than {MAX_BYTES} bytes, which no scenario is")

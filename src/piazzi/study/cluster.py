@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import logging
+import os
 import pickle
 import time
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from functools import lru_cache
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any, NoReturn
+from threading import Thread
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from piazzi.study.pieces import run_task
 from piazzi.study.plan import Study
-from piazzi.study.pool import THREADS, Outcome, processors
+from piazzi.study.pool import ENVIRONMENT, Outcome, processors
 from piazzi.study.tasks import Piece, Task
 from piazzi.study.versions import difference_of, fingerprint
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
+T = TypeVar("T")
 LOCAL = "local"
 CONNECT_SECONDS = 5  # a dead address fails within ten, however it is dead and with all imports
 COUNT_SECONDS = 2.0
 WORKERS_SECONDS = 30  # until a scheduler has its first worker
+SILENCE_SECONDS = 60.0  # a scheduler that answers nothing for so long is given up
 LOSSES = 3  # times that a task is run again because its worker was gone before its results were fetched
 
 
@@ -36,34 +41,36 @@ class Cluster:
     study : Study
     address : of a scheduler, ``tcp://host:8786``, or "local"
     workers : processes of a local cluster
+    silence : seconds after which a scheduler that answers nothing is given up
 
     Raises
     ------
     OSError
-        Where the scheduler does not answer.
+        Where the scheduler does not answer, here or later.
     ValueError
         Where Dask is not installed, the address makes no sense, or workers have other versions than this process.
     """
 
-    def __init__(self, study: Study, address: str, workers: int | None) -> None:
+    def __init__(self, study: Study, address: str, workers: int | None, silence: float = SILENCE_SECONDS) -> None:
         try:
             import distributed  # noqa: F401
         except ImportError:
             raise ValueError(
                 "--scheduler needs Dask, which is not installed: pip install 'piazzi[cluster]', here and on the workers"
             ) from None
-        for name in ("distributed", "tornado.application", "asyncio"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)
+        _quiet()
         self._study, self._here = pickle.dumps(study), fingerprint()
         self._futures: dict[str, tuple[Future, Task]] = {}
         self._done: SimpleQueue[str] = SimpleQueue()
         self._losses: Counter[Task] = Counter()
         self._slots, self._counted = 1, -COUNT_SECONDS
-        self._cluster = _local(workers) if address == LOCAL else None
-        self.address = self._cluster.scheduler_address if self._cluster else address
+        self._silence, self._heard = silence, time.monotonic()
+        self._environment = {name: os.environ.get(name) for name in ENVIRONMENT}
         try:
+            self._cluster = _local(workers) if address == LOCAL else None
+            self.address = self._cluster.scheduler_address if self._cluster else address
             self._client = _client(self.address)
-            _check_versions(self._client, self.address, self._here)
+            _check_versions(self._client, self.address, self._here, silence)
         except BaseException:
             self.close()
             raise
@@ -73,8 +80,10 @@ class Cluster:
         """Threads of all workers there are, asked for again every few seconds."""
         if time.monotonic() > self._counted + COUNT_SECONDS:
             try:
-                self._slots = max(1, int(sum(self._client.nthreads().values())))
-            except (OSError, TimeoutError):
+                self._slots = max(1, int(sum(_within(self._silence, self._client.nthreads).values())))
+            except TimeoutError:
+                self._gone(f"has not answered for {self._silence:g} s")
+            except OSError:
                 self._gone()
             self._counted = time.monotonic()
         return self._slots
@@ -90,6 +99,8 @@ class Cluster:
             try:
                 key = self._done.get(timeout=1)
             except Empty:
+                if time.monotonic() > self._heard + CONNECT_SECONDS:
+                    self._check_answers()
                 continue
             future, task = self._futures.pop(key)
             outcome = self._outcome(future, task)
@@ -102,6 +113,11 @@ class Cluster:
             if thing is not None:
                 with suppress(Exception):
                     thing.close(timeout=3)
+        for name, value in self._environment.items():
+            if value is not None:
+                os.environ[name] = value
+            else:
+                os.environ.pop(name, None)
 
     def _outcome(self, future: Future, task: Task) -> Outcome | None:
         """What became of a task, None where its results were lost with a worker and it has to run again."""
@@ -123,11 +139,7 @@ class Cluster:
 
     def _lost(self, task: Task) -> Outcome | None:
         """The same where a task was finished and its results are not to be had: the worker is gone, or the scheduler is."""
-        self._check_connected()
-        try:
-            _knock(self.address)
-        except ConnectionError:
-            self._gone()
+        self._check_answers()
         self._losses[task] += 1
         if self._losses[task] <= LOSSES:
             return None
@@ -137,20 +149,60 @@ class Cluster:
         if self._client.status not in ("running", "connecting"):
             self._gone()
 
-    def _gone(self) -> NoReturn:
-        raise ConnectionError(f"the scheduler at {self.address} is gone; what was finished is kept")
+    def _check_answers(self) -> None:
+        """Raise where the scheduler, asked for as long as it may be silent, says nothing: it is stopped, or out of reach."""
+        end = time.monotonic() + self._silence
+        while True:
+            self._check_connected()
+            try:
+                _knock(self.address)
+            except ConnectionError:
+                if time.monotonic() < end:
+                    continue
+                self._gone(f"has not answered for {self._silence:g} s")
+            self._heard = time.monotonic()
+            return
+
+    def _gone(self, how: str = "is gone") -> NoReturn:
+        raise ConnectionError(f"the scheduler at {self.address} {how}; what was finished is kept")
+
+
+def _quiet() -> None:
+    """Leave it to this module to say what is wrong: Dask gives loggers below its first levels of their own."""
+    known = [name for name in logging.root.manager.loggerDict if name.startswith("distributed.")]
+    for name in ("distributed", "tornado.application", "asyncio", *known):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def _within(seconds: float, call: Callable[..., T], *arguments: Any) -> T:
+    """What a call returns that may never return; raises TimeoutError where it takes longer."""
+    results: SimpleQueue[tuple[bool, Any]] = SimpleQueue()
+
+    def answer() -> None:
+        try:
+            results.put((True, call(*arguments)))
+        except BaseException as error:
+            results.put((False, error))
+
+    Thread(target=answer, daemon=True).start()
+    try:
+        succeeded, result = results.get(timeout=seconds)
+    except Empty:
+        raise TimeoutError(f"no answer for {seconds:g} s") from None
+    if not succeeded:
+        raise result
+    found: T = result
+    return found
 
 
 def _local(workers: int | None) -> Any:
-    """A cluster of single-threaded processes on this machine."""
-    import os
-
+    """A cluster of single-threaded processes on this machine, which inherit `ENVIRONMENT` from this process."""
     import dask
     from distributed import LocalCluster
 
     # a worker that dies takes its task with it at once: how often it is tried again is decided here
     dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.comm.timeouts.connect": "10s"})
-    os.environ.update(dict.fromkeys(THREADS, "1"))
+    os.environ.update(ENVIRONMENT)
     return LocalCluster(
         n_workers=workers or processors(), threads_per_worker=1, silence_logs=logging.CRITICAL, dashboard_address="127.0.0.1:0"
     )
@@ -192,9 +244,11 @@ def _knock(address: str) -> None:
         raise ValueError(f"{address!r} is no address of a scheduler, such as tcp://host:8786: {error}") from None
 
 
-def _check_versions(client: Client, address: str, here: dict[str, str]) -> None:
+def _check_versions(client: Client, address: str, here: dict[str, str], silence: float) -> None:
     try:
-        there = client.run(fingerprint)
+        there: dict[str, dict[str, str]] = _within(silence, client.run, fingerprint)
+    except TimeoutError:
+        raise ConnectionError(f"a worker of {address}, or the scheduler, has not answered for {silence:g} s") from None
     except Exception as error:
         raise ValueError(f"workers of {address} cannot run Piazzi: {type(error).__name__}: {error}") from None
     for worker, versions in there.items():

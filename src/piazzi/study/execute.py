@@ -15,6 +15,7 @@ from piazzi.study.plan import Study
 from piazzi.study.pool import Here, Processes, Workers, processors
 from piazzi.study.runner import Progress, Runner
 from piazzi.study.store import Stored, read_store, write_store
+from piazzi.study.tasks import Task
 from piazzi.study.versions import difference_of, fingerprint
 
 
@@ -121,7 +122,15 @@ def _log(study: Study, path: Path, resume: bool) -> Log:
     if change:
         log.close()
         raise ValueError(f"{path} was begun by {change}: results would not be the same; finish it there, or remove it")
+    log.entries = [entry for entry in log.entries if _belongs(study, entry.task)]  # what does not is damage: it is run again
     return log
+
+
+def _belongs(study: Study, task: Task) -> bool:
+    """Whether a task is one of the study's: whatever is in a log, this is what the runs that are missing are counted by."""
+    numbers = (task.point, task.first, task.count)
+    whole = all(type(i) is int and i >= 0 for i in numbers)
+    return whole and task.point < study.points and task.first + task.count <= study.runs
 
 
 def _difference(there: Any, here: Mapping[str, Any]) -> str:

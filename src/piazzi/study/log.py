@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import stat
 import struct
 from collections.abc import Iterator
 from contextlib import suppress
@@ -19,7 +20,8 @@ from piazzi.study.tasks import Piece, Task
 ENDING = ".runs"
 _MAGIC = b"PZRUNS1\n"
 _HEAD = struct.Struct("<8sQ32s")  # magic, length of what follows, its SHA-256
-_LONGEST = 2**34
+_LONGEST, _LONGEST_HEADER, _PART = 2**34, 2**30, 2**20
+_LOCKED_BYTE = 2**31 - 2  # Windows keeps others from the bytes that are locked, and locks none behind this one
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,8 @@ class Log:
         """What there is, without the tail that a sudden end left behind; raises OSError, or ValueError for another file."""
         file = open(path, "r+b", buffering=0)  # noqa: SIM115
         try:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise ValueError(f"{path}: it is a pipe or a device, not a file")
             _lock(file, path)
             return cls._scan(path, file)
         except BaseException:
@@ -70,7 +74,7 @@ class Log:
             raise ValueError(f"{path}: no runs of a study are in this file")
         entries, end = [], file.tell()
         while True:
-            found = _read(file)
+            found = _read(file, body=False)
             if found is None:
                 behind = _behind(file, end)
                 if behind is None:
@@ -113,8 +117,11 @@ class Log:
 
     def remove(self) -> None:
         """Close and delete."""
-        with suppress(FileNotFoundError):
-            self.path.unlink()
+        try:  # while it is locked, where the system removes files that are open; Windows does not
+            self.path.unlink(missing_ok=True)
+        except PermissionError:
+            self._file.close()
+            self.path.unlink(missing_ok=True)
         self._file.close()
 
     def _append_bytes(self, data: bytes) -> None:
@@ -136,19 +143,28 @@ def _record(header: dict[str, Any], body: bytes) -> bytes:
     return _HEAD.pack(_MAGIC, len(payload), hashlib.sha256(payload).digest()) + payload
 
 
-def _read(file: IO[bytes]) -> tuple[dict[str, Any], bytes] | None:
-    """Header and body of the next record; None where there is no whole one."""
+def _read(file: IO[bytes], body: bool = True) -> tuple[dict[str, Any], bytes] | None:
+    """Header and body (or b"" where it is not wanted) of the next record; None where there is no whole one.
+
+    It is read in parts: a file with holes can declare what no memory holds.
+    """
     head = file.read(_HEAD.size)
     if len(head) < _HEAD.size:
         return None
     magic, length, digest = _HEAD.unpack(head)
     if magic != _MAGIC or not 8 <= length <= _LONGEST or length > os.fstat(file.fileno()).st_size - file.tell():
         return None
-    payload = file.read(length)
-    if len(payload) != length or hashlib.sha256(payload).digest() != digest:
+    start = file.read(8)
+    (size,) = struct.unpack("<Q", start)
+    if size > min(length - 8, _LONGEST_HEADER):
         return None
-    (size,) = struct.unpack_from("<Q", payload)
-    return json.loads(payload[8 : 8 + size]), payload[8 + size :]
+    text, left, parts = file.read(size), length - 8 - size, list[bytes]()
+    checksum = hashlib.sha256(start + text)
+    while left > 0 and (part := file.read(min(left, _PART))):
+        checksum.update(part)
+        left -= len(part)
+        parts += [part] * body
+    return (json.loads(text), b"".join(parts)) if checksum.digest() == digest else None
 
 
 def _behind(file: IO[bytes], start: int) -> int | None:
@@ -187,15 +203,28 @@ def _unpacked(header: dict[str, Any], body: bytes) -> Piece:
 def _lock(file: IO[bytes], path: Path) -> None:
     """Keep other processes out for as long as the file is open, where the system can."""
     try:
+        _lock_exclusively(file)
+    except (BlockingIOError, PermissionError):
+        raise ValueError(f"{path}: another process is running this study") from None
+    except (ImportError, OSError):
+        return  # a system or a file system without locks
+
+
+def _lock_exclusively(file: IO[bytes]) -> None:
+    """Raise BlockingIOError, on Windows PermissionError, where another process has the lock."""
+    try:
         import fcntl
     except ImportError:
+        import msvcrt
+
+        windows: Any = msvcrt
+        file.seek(_LOCKED_BYTE)
+        try:
+            windows.locking(file.fileno(), windows.LK_NBLCK, 1)
+        finally:
+            file.seek(0)
         return
-    try:
-        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise ValueError(f"{path}: another process is running this study") from None
-    except OSError:
-        return  # a file system without locks
+    fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _settle_folder(path: Path) -> None:

@@ -20,6 +20,8 @@ from piazzi.study.tasks import Piece, Task
 
 _LENGTH = struct.Struct("<Q")
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+# Of every child: one thread, and no import from the working directory, where there may be files of any name
+ENVIRONMENT = {**dict.fromkeys(THREADS, "1"), "PYTHONSAFEPATH": "1"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +149,8 @@ class Processes:
             end(process)
 
     def _start(self) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-c", "from piazzi.study.worker import main; main()"]
-        environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
+        command = [sys.executable, "-P", "-c", "from piazzi.study.worker import main; main()"]
+        environment = {**os.environ, **ENVIRONMENT}
         environment["PYTHONPATH"] = os.pathsep.join(p for p in sys.path if p)
         return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
 
