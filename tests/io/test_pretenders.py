@@ -55,7 +55,7 @@ def test_runs_beside_a_store_are_none(tmp_path, what):
 def test_a_pipe_is_not_written_to(tmp_path):
     path = tmp_path / "out.csv"
     os.mkfifo(path)
-    with pytest.raises(OSError, match="cannot write .*out.csv: it is a pipe"), atomic_path(path) as work:
+    with pytest.raises(OSError, match=r"cannot write .*out.csv: it is a pipe"), atomic_path(path) as work:
         work.write_text("x")
     assert os.listdir(tmp_path) == ["out.csv"]
 
