@@ -7,13 +7,15 @@ and `FUNCTIONS`, with Python's precedence.  Text is never given to Python's or S
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from piazzi.expressions.bounds import read
 from piazzi.expressions.errors import ExpressionError, quote, suggest
-from piazzi.expressions.language import CONSTANTS, FUNCTIONS
-from piazzi.expressions.numeric import evaluate
-from piazzi.expressions.parse import Parsed, is_name
+from piazzi.expressions.functions import arities
+from piazzi.expressions.language import CONSTANTS
+from piazzi.expressions.numeric import evaluate, evaluate_arrays
+from piazzi.expressions.parse import Equation, is_name
 from piazzi.expressions.symbolic import build, symbol
 from piazzi.expressions.writing import write
 
@@ -23,15 +25,20 @@ if TYPE_CHECKING:
 __all__ = [
     "CONSTANTS",
     "FUNCTIONS",
+    "Equation",
     "ExpressionError",
     "check",
     "evaluate",
+    "evaluate_arrays",
     "from_sympy",
     "is_name",
     "names",
     "symbol",
     "to_sympy",
 ]
+
+#: The functions that an equation may call, and how many arguments each takes; `min` and `max` take that many or more.
+FUNCTIONS: Mapping[str, int] = MappingProxyType(arities())
 
 
 def names(text: str) -> frozenset[str]:
@@ -84,9 +91,9 @@ def from_sympy(expr: object) -> str:
     return write(expr)
 
 
-def _read_with(text: str, allowed: Collection[str] | Mapping[str, object]) -> Parsed:
-    parsed = read(text)
-    for name, column in parsed.names.items():
+def _read_with(text: str, allowed: Collection[str] | Mapping[str, object]) -> Equation:
+    equation = read(text)
+    for name, column in equation.names.items():
         if name not in allowed:
             raise ExpressionError(f"unknown name {quote(name)}{suggest(name, [*allowed, *CONSTANTS])}", text, column)
-    return parsed
+    return equation

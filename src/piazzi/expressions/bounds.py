@@ -13,20 +13,18 @@ import operator
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, TypeAlias
 
 from piazzi.expressions.errors import ExpressionError
-from piazzi.expressions.language import CONSTANTS, MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum
-from piazzi.expressions.numeric import CALLS
-from piazzi.expressions.parse import Parsed, parse
+from piazzi.expressions.functions import TABLE
+from piazzi.expressions.language import CONSTANTS, MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum, fold
+from piazzi.expressions.parse import Equation, parse
 
 MAX_EXPONENT = 64
 MAX_POWER_DIGITS = 4000
 LOG10_2 = math.log10(2.0)
-EXACT = frozenset({"abs", "min", "max"})
-FORWARD = frozenset({"sin", "cos", "tan", "sinh", "cosh", "tanh"})
-#: Digits before the decimal point, of functions with values of at most 1 or pi.
-SMALL = {"sin": 0.0, "cos": 0.0, "tanh": 0.0, "sign": 0.0, "asin": 0.5, "acos": 0.5, "atan": 0.5, "atan2": 0.5}
+REMEMBERED = 4096  # equations
 
 Value: TypeAlias = Fraction | float
 
@@ -54,19 +52,33 @@ class Bound:
         return max(self.numerator, self.denominator)
 
 
-def read(text: str) -> Parsed:
-    """Return the tree of an equation whose every constant is real, finite and small enough; else raise `ExpressionError`."""
-    parsed = parse(text)
+def read(text: str) -> Equation:
+    """Return an equation whose every constant is real, finite and small enough; else raise `ExpressionError`.
+
+    A text is parsed once: what is read again is the same object.
+    """
+    hashable: object = text
+    return _read(text) if isinstance(hashable, str) else parse(text)  # which refuses what is no text
+
+
+def forget() -> None:
+    """Forget what was read: the language has changed."""
+    _read.cache_clear()
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _read(text: str) -> Equation:
+    equation = parse(text)
     try:
-        _bound(parsed.tree, text)
+        fold(equation.tree, lambda node, parts: _bound(node, parts, text))
     except RecursionError:
         raise ExpressionError("the equation is nested too deep", text) from None
-    return parsed
+    return equation
 
 
-def _bound(node: Node, text: str) -> Bound:
+def _bound(node: Node, parts: list[Bound], text: str) -> Bound:
     try:
-        bound = _bound_of(node, text)
+        bound = _bound_of(node, parts, text)
     except ZeroDivisionError:
         raise ExpressionError("division by zero", text, node.column) from None
     except OverflowError:
@@ -79,7 +91,7 @@ def _bound(node: Node, text: str) -> Bound:
     return bound
 
 
-def _bound_of(node: Node, text: str) -> Bound:
+def _bound_of(node: Node, parts: list[Bound], text: str) -> Bound:
     match node:
         case Number(value=int() as value):
             digits = math.log10(max(value, 1))
@@ -88,19 +100,17 @@ def _bound_of(node: Node, text: str) -> Bound:
             return Bound(float(value))
         case Name(name=name):
             return Bound(CONSTANTS.get(name))
-        case Negative(operand=operand):
-            bound = _bound(operand, text)
+        case Negative():
+            (bound,) = parts
             return bound if bound.value is None else replace(bound, value=-bound.value)
         case Sum(terms=terms):
-            return _sum(terms, text)
+            return _sum([(subtracted, child, part) for (subtracted, child), part in zip(terms, parts, strict=True)], text)
         case Product(factors=factors):
-            return _product(factors, text)
-        case Power(base=base, exponent=exponent):
-            return _power(_bound(base, text), _bound(exponent, text), node, text)
-        case Call(function="sqrt", arguments=(argument,)):
-            return _power(_bound(argument, text), Bound(Fraction(1, 2)), node, text)
-        case Call(arguments=arguments):
-            return _call(node, [_bound(argument, text) for argument in arguments], text)
+            return _product([(divides, child, part) for (divides, child), part in zip(factors, parts, strict=True)], text)
+        case Power():
+            return _power(parts[0], parts[1], node, text)
+        case Call():
+            return _call(node, parts, text)
 
 
 def _check_value(value: Value | None, node: Node, text: str) -> None:
@@ -116,10 +126,9 @@ def _check_value(value: Value | None, node: Node, text: str) -> None:
         raise ExpressionError(problem, text, node.column)
 
 
-def _sum(terms: tuple[tuple[bool, Node], ...], text: str) -> Bound:
+def _sum(terms: list[tuple[bool, Node, Bound]], text: str) -> Bound:
     total = Bound(Fraction(0), -math.inf, -math.inf)
-    for subtracted, node in terms:
-        term = _bound(node, text)
+    for subtracted, node, term in terms:
         value = None
         if total.value is not None and term.value is not None:
             value = _exact_or_double(operator.sub if subtracted else operator.add, total.value, term.value)
@@ -135,10 +144,9 @@ def _sum(terms: tuple[tuple[bool, Node], ...], text: str) -> Bound:
     return total
 
 
-def _product(factors: tuple[tuple[bool, Node], ...], text: str) -> Bound:
+def _product(factors: list[tuple[bool, Node, Bound]], text: str) -> Bound:
     total = Bound(Fraction(1))
-    for divides, node in factors:
-        factor = _bound(node, text)
+    for divides, node, factor in factors:
         if divides and factor.value == 0:
             raise ExpressionError("division by zero", text, node.column)
         value = None
@@ -182,26 +190,29 @@ def _power(base: Bound, exponent: Bound, node: Node, text: str) -> Bound:
 
 
 def _call(call: Call, arguments: list[Bound], text: str) -> Bound:
-    function = call.function
+    function = TABLE[call.function]
+    if function.growth == "root":
+        return _power(arguments[0], Bound(Fraction(1, 2)), call, text)
     digits, under_log = sum(a.digits for a in arguments), sum(a.under_log for a in arguments)
     exponential = any(a.exponential for a in arguments)
-    degree = max(a.degree for a in arguments) if function == "abs" else 1.0
+    degree = max(a.degree for a in arguments) if function.growth == "magnitude" else 1.0
     value = None
     values = [a.value for a in arguments if a.value is not None]
     if len(values) == len(arguments):
-        value = CALLS[function](*values) if function in EXACT else CALLS[function](*map(float, values))
-    if function == "log":  # log(exp(a)) is a; of any other argument a logarithm leaves no number
+        value = function.value(*values) if function.exact else float(function.value(*map(float, values)))
+    if function.growth == "logarithm":  # log(exp(a)) is a; of any other argument a logarithm leaves no number
         unwrapped = digits if exponential else 0.0
         return Bound(value, unwrapped, unwrapped, unwrapped, under_log + digits, exponential)
-    if function == "exp":  # exp(a*log(b)) is b**a
+    if function.growth == "exponential":  # exp(a*log(b)) is b**a
         if value == 0.0:
             raise OverflowError  # downwards
         grown = _grown(_ten_to(arguments[0].size), under_log, call, text)
         grown += digits
         return Bound(value, grown, grown, grown, under_log, True)
-    if function in FORWARD or function == "hypot":  # cos(asin(a)) is sqrt(1 - a**2)
+    if function.growth == "doubled":  # cos(asin(a)) is sqrt(1 - a**2)
         digits = 2 * digits + LOG10_2
-    return Bound(value, SMALL.get(function, digits), digits, digits, under_log, exponential, degree)
+    size = digits if function.size is None else function.size
+    return Bound(value, size, digits, digits, under_log, exponential, degree)
 
 
 def _grown(size: float, digits: float, node: Node, text: str) -> float:

@@ -1,20 +1,14 @@
-"""The vocabulary of equations: the allowed functions and constants, the limits, and the tree a text becomes."""
+"""The constants of equations, the limits, and the tree a text becomes; the functions are in `functions`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
-#: Allowed functions and how many arguments each takes; `min` and `max` take that many or more.
-FUNCTIONS: Mapping[str, int] = MappingProxyType(
-    dict.fromkeys(("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "sign"), 1)
-    | dict.fromkeys(("atan2", "hypot", "min", "max"), 2)
-)
 CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": math.pi})
-VARIADIC = frozenset({"min", "max"})
 
 MAX_LENGTH = 10_000
 MAX_NAME = 64
@@ -84,3 +78,23 @@ class Power:
 
 
 Node: TypeAlias = Number | Name | Call | Negative | Sum | Product | Power
+T = TypeVar("T")
+
+
+def fold(node: Node, combine: Callable[[Node, list[T]], T]) -> T:
+    """The value of a tree from the bottom up: `combine` makes that of a node from those of its children, in their order.
+
+    What is done with a tree differs in `combine` alone: numbers, arrays, bounds and SymPy expressions come of one walk.
+    """
+    match node:
+        case Number() | Name():
+            children: tuple[Node, ...] = ()
+        case Call(arguments=arguments):
+            children = arguments
+        case Negative(operand=operand):
+            children = (operand,)
+        case Sum(terms=pairs) | Product(factors=pairs):
+            children = tuple(child for _, child in pairs)
+        case Power(base=base, exponent=exponent):
+            children = (base, exponent)
+    return combine(node, [fold(child, combine) for child in children])

@@ -16,18 +16,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import NamedTuple
 
 from piazzi.expressions.errors import ExpressionError, quote, suggest
+from piazzi.expressions.functions import TABLE, arities
 from piazzi.expressions.language import (
     CONSTANTS,
-    FUNCTIONS,
     MAX_DEPTH,
     MAX_DIGITS,
     MAX_EXTREMES,
     MAX_LENGTH,
-    VARIADIC,
     Call,
     Name,
     Negative,
@@ -42,15 +41,16 @@ from piazzi.expressions.tokens import Token, tokenize
 ALIASES = {"ln": "log", "sgn": "sign", "fabs": "abs", "pow": "**"}
 
 
-class Parsed(NamedTuple):
-    """An equation as a tree, and the column where each free name first stands."""
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """An equation as its text, its tree, and the column where each free name first stands: equal where the texts are."""
 
     text: str
-    tree: Node
-    names: Mapping[str, int]
+    tree: Node = field(compare=False, repr=False)
+    names: Mapping[str, int] = field(compare=False, repr=False)
 
 
-def parse(text: str) -> Parsed:
+def parse(text: str) -> Equation:
     """Return the tree of an equation; `ExpressionError` says what is outside the language, and where."""
     if not isinstance(text, str):
         raise ExpressionError(f"an equation must be text, not {type(text).__name__}", "")
@@ -65,16 +65,16 @@ def parse(text: str) -> Parsed:
         raise ExpressionError("the equation is nested too deep", text) from None
     if reader.next.kind != "end":
         raise reader.unexpected()
-    return Parsed(text, tree, MappingProxyType(reader.names))
+    return Equation(text, tree, MappingProxyType(reader.names))
 
 
 def is_name(text: str) -> bool:
     """Return whether `text`, to the letter, can name a state, parameter or input."""
     try:
-        tree = parse(text).tree
-    except ExpressionError:
+        token = tokenize(text)[0]
+    except (ExpressionError, TypeError):
         return False
-    return isinstance(tree, Name) and tree.name == text and text not in CONSTANTS
+    return token.kind == "name" and token.piece == text and text not in (*arities(), *CONSTANTS)
 
 
 class _Reader:
@@ -188,7 +188,7 @@ class _Reader:
         return value
 
     def name(self, token: Token) -> Name:
-        if token.piece in FUNCTIONS:
+        if token.piece in arities():
             raise self.error(f"{quote(token.piece)} is a function and needs its arguments in brackets", token)
         if token.piece not in CONSTANTS:
             self.names.setdefault(token.piece, token.column)
@@ -196,20 +196,20 @@ class _Reader:
 
     def call(self, token: Token) -> Call:
         function = token.piece
-        if function not in FUNCTIONS:
-            hint = f"; write {quote(ALIASES[function])}" if function in ALIASES else suggest(function, FUNCTIONS)
+        if function not in arities():
+            hint = f"; write {quote(ALIASES[function])}" if function in ALIASES else suggest(function, arities())
             raise self.error(f"{quote(function)} is not a function{hint or '; write * to multiply'}", token)
         arguments = self.bracket(many=True)
         self.check_count(token, len(arguments))
         return Call(function, arguments, token.column)
 
     def check_count(self, token: Token, got: int) -> None:
-        function, arity = token.piece, FUNCTIONS[token.piece]
-        if function in VARIADIC:
+        function = TABLE[token.piece]
+        if function.variadic:
             self.extremes += got
             if self.extremes > MAX_EXTREMES:
                 raise self.error(f"min and max have more than {MAX_EXTREMES} arguments in all", token)
-        if got < arity or (got > arity and function not in VARIADIC):
-            or_more = " or more" if function in VARIADIC else ""
-            plural = "" if arity == 1 else "s"
-            raise self.error(f"{function} takes {arity}{or_more} argument{plural}, got {got}", token)
+        if got < function.arity or (got > function.arity and not function.variadic):
+            or_more = " or more" if function.variadic else ""
+            plural = "" if function.arity == 1 else "s"
+            raise self.error(f"{function.name} takes {function.arity}{or_more} argument{plural}, got {got}", token)

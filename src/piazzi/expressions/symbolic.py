@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from piazzi.expressions.bounds import MAX_EXPONENT
 from piazzi.expressions.errors import ExpressionError
-from piazzi.expressions.language import MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum
-from piazzi.expressions.parse import Parsed
+from piazzi.expressions.functions import TABLE
+from piazzi.expressions.language import MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum, fold
+from piazzi.expressions.parse import Equation
 
 if TYPE_CHECKING:
     import sympy as sp
-
-SYMPY_NAMES = {"min": "Min", "max": "Max"}
 
 
 @functools.cache
@@ -26,22 +25,23 @@ def symbol(name: str) -> sp.Symbol:
     return sp.Symbol(name, real=True)
 
 
-def build(parsed: Parsed, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
+def build(equation: Equation, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
     """Return the SymPy expression of a checked equation; `ExpressionError` where SymPy finds no finite real value."""
     import sympy as sp
 
-    expr = _build(parsed.tree, parsed.text, symbols)
+    text = equation.text
+    expr = fold(equation.tree, lambda node, parts: _build(node, parts, text, symbols))
     if expr.has(sp.I, sp.nan, sp.zoo, sp.oo, -sp.oo, sp.re, sp.im, sp.arg):
-        raise ExpressionError("the equation has no finite real value", parsed.text)
+        raise ExpressionError("the equation has no finite real value", text)
     for number in expr.atoms(sp.Number):
         if not _fits_a_double(number):
-            raise ExpressionError("a constant of the simplified equation does not fit a double", parsed.text)
+            raise ExpressionError("a constant of the simplified equation does not fit a double", text)
     return expr
 
 
-def _build(node: Node, text: str, symbols: Mapping[str, sp.Symbol]) -> Any:
+def _build(node: Node, parts: list[Any], text: str, symbols: Mapping[str, sp.Symbol]) -> Any:
     try:
-        expr = _build_unchecked(node, text, symbols)
+        expr = _build_unchecked(node, parts, text, symbols)
         finite = _is_finite_real(expr, grows=isinstance(node, Power | Call))
     except ExpressionError:
         raise
@@ -52,7 +52,7 @@ def _build(node: Node, text: str, symbols: Mapping[str, sp.Symbol]) -> Any:
     return expr
 
 
-def _build_unchecked(node: Node, text: str, symbols: Mapping[str, sp.Symbol]) -> Any:
+def _build_unchecked(node: Node, parts: list[Any], text: str, symbols: Mapping[str, sp.Symbol]) -> Any:
     import sympy as sp
 
     match node:
@@ -64,24 +64,16 @@ def _build_unchecked(node: Node, text: str, symbols: Mapping[str, sp.Symbol]) ->
             return sp.pi
         case Name(name=name):
             return symbols[name]
-        case Negative(operand=operand):
-            return -_build(operand, text, symbols)
+        case Negative():
+            return -parts[0]
         case Sum(terms=terms):
-            built = [(subtracted, _build(term, text, symbols)) for subtracted, term in terms]
-            return sp.Add(*(-term if subtracted else term for subtracted, term in built))
+            return sp.Add(*(-part if subtracted else part for (subtracted, _), part in zip(terms, parts, strict=True)))
         case Product(factors=factors):
-            return _product([(divides, _build(factor, text, symbols), factor.column) for divides, factor in factors], text)
-        case Power(base=base, exponent=exponent):
-            return _power(_build(base, text, symbols), _build(exponent, text, symbols), node, text)
-        case Call(function="exp", arguments=(argument,)):
-            return _exp(_build(argument, text, symbols))
-        case Call(function="abs", arguments=(argument,)):
-            return _abs(_build(argument, text, symbols))
-        case Call(function="hypot", arguments=(a, b)):
-            return sp.sqrt(_build(a, text, symbols) ** 2 + _build(b, text, symbols) ** 2)
-        case Call(function=function, arguments=arguments):
-            build_call = getattr(sp, SYMPY_NAMES.get(function, function))  # one of FUNCTIONS: the parser saw to it
-            return build_call(*(_build(argument, text, symbols) for argument in arguments))
+            return _product([(d, part, child.column) for (d, child), part in zip(factors, parts, strict=True)], text)
+        case Power():
+            return _power(parts[0], parts[1], node, text)
+        case Call(function=function):
+            return TABLE[function].on_sympy(*parts)
 
 
 def _product(factors: list[tuple[bool, Any, int]], text: str) -> Any:
@@ -105,26 +97,6 @@ def _power(base: Any, exponent: Any, node: Node, text: str) -> Any:
     if exponent.is_number and abs(float(exponent)) > MAX_EXPONENT:
         raise ExpressionError(f"exponent simplifies to {float(exponent):.6g}, beyond {MAX_EXPONENT}", text, node.column)
     return base**exponent
-
-
-def _exp(argument: Any) -> Any:
-    """Return exp of a SymPy argument, whose Float term, if any, becomes the same double as a fraction.
-
-    SymPy takes exp(x + 750.4) apart into exp(750.4)*exp(x), and exp(750.4) is no double: with a fraction it does not.
-    """
-    import sympy as sp
-
-    if argument.is_Add:
-        argument = sp.Add(*(sp.Rational(float(term)) if term.is_Float else term for term in argument.args))
-    return sp.exp(argument)
-
-
-def _abs(argument: Any) -> Any:
-    """Return abs of a SymPy argument, as a root where SymPy cannot tell that x**1.5 is real and would take its real part."""
-    import sympy as sp
-
-    magnitude = sp.Abs(argument)
-    return sp.sqrt(argument**2) if magnitude.has(sp.re, sp.im, sp.arg) else magnitude
 
 
 def _is_finite_real(expr: Any, *, grows: bool) -> bool:

@@ -9,11 +9,10 @@ from typing import Any
 
 from piazzi.expressions.bounds import read
 from piazzi.expressions.errors import ExpressionError, quote
-from piazzi.expressions.language import FUNCTIONS, MAX_DIGITS, MAX_LENGTH
+from piazzi.expressions.functions import arities, of_sympy
+from piazzi.expressions.language import MAX_DIGITS, MAX_LENGTH
 from piazzi.expressions.parse import is_name
 
-SUPPORTED = f"an equation has real numbers, symbols, pi, + - * / ** and {', '.join(FUNCTIONS)}"
-WRITTEN_AS = {"Abs": "abs", "Min": "min", "Max": "max"}
 # How tightly a piece of text holds together: a looser piece goes into brackets inside a tighter one.
 SUM, PRODUCT, POWER, ATOM = range(4)
 
@@ -60,7 +59,7 @@ def _write(expr: Any) -> tuple[str, int]:
     import sympy as sp
 
     if not isinstance(expr, sp.Expr):
-        raise _UnsupportedError(expr, f"{type(expr).__name__} is not supported; {SUPPORTED}")
+        raise _unsupported(expr)
     if type(expr) is sp.Symbol:
         return expr.name, ATOM
     if expr is sp.pi:
@@ -148,14 +147,18 @@ def _power(base: Any, exponent: Any) -> tuple[str, int]:
 def _call(expr: Any) -> str:
     import sympy as sp
 
-    kind = expr.func.__name__
-    name = WRITTEN_AS.get(kind, kind)
-    if name not in FUNCTIONS or getattr(sp, kind, None) is not expr.func:
-        raise _UnsupportedError(expr, f"{type(expr).__name__} is not supported; {SUPPORTED}")
-    arguments = _in_order(expr.args) if name in ("min", "max") else expr.args
-    if name == "exp" and arguments[0].is_Add:
+    function = of_sympy(expr)
+    if function is None or function.derived:
+        raise _unsupported(expr)
+    arguments = _in_order(expr.args) if function.variadic else expr.args
+    if function.growth == "exponential" and arguments[0].is_Add:
         arguments = [sp.Add(*map(_as_decimal, arguments[0].args), evaluate=False)]
-    return f"{name}({', '.join(_write(argument)[0] for argument in arguments)})"
+    return f"{function.name}({', '.join(_write(argument)[0] for argument in arguments)})"
+
+
+def _unsupported(expr: Any) -> _UnsupportedError:
+    kinds = f"an equation has real numbers, symbols, pi, + - * / ** and {', '.join(arities())}"
+    return _UnsupportedError(expr, f"{type(expr).__name__} is not supported; {kinds}")
 
 
 def _as_decimal(term: Any) -> Any:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from math import cosh, fabs, inf, isnan, nan, pi, pow, sinh, sqrt, tanh  # noqa: A004
+from math import inf, isnan, nan, pi, pow  # noqa: A004
 from typing import Any
 
 from numba import cfunc, njit, types
 
+from piazzi.expressions.functions import TABLE as _TABLE
 from piazzi.kernels.compiler import EntryPipeline
 from piazzi.kernels.lanes import (
     alike,
     ceil,
+    elementary,
     fused,
     gathered,
     heaviside,
@@ -36,10 +39,18 @@ from piazzi.kernels.lanes import (
     unit,
     vector,
 )
-from piazzi.kernels.lanes.elementary import HELPER, OPTIONS, acos, asin, atan, atan2, cos, exp, log, sin, tan
+from piazzi.kernels.lanes.elementary import HELPER, OPTIONS
 from piazzi.kernels.lanes.pieces import choose
 from piazzi.kernels.plain import unless_missing as _unless_missing
 
+# The language's functions: our own where there is one, else the C library's
+globals().update(
+    {
+        f.kernel: getattr(elementary, f.kernel, None) or getattr(math, f.kernel)
+        for f in _TABLE.values()
+        if f.kernel and not f.code and f.kernel not in globals()
+    }
+)
 Array = types.CPointer(types.float64)
 Indices = types.CPointer(types.int64)
 _SCALARS = {int: types.int64, float: types.float64}

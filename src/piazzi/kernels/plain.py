@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 # NumPy's, because `math` raises where C gives NaN or infinity
-from numpy import arccos as acos
-from numpy import arcsin as asin
-from numpy import arctan as atan
-from numpy import arctan2 as atan2
-from numpy import ceil, cos, cosh, exp, fabs, log, sin, sinh, sqrt, tan, tanh
+from numpy import ceil
 from numpy import power as pow  # noqa: A004
+
+from piazzi.expressions.functions import TABLE as _TABLE
+
+globals().update({f.kernel: f.on_arrays for f in _TABLE.values() if f.kernel and not f.code and not f.derived})
 
 Array = np.ndarray[Any, Any]
 Indices = np.ndarray[Any, Any]

@@ -10,22 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from piazzi.expressions.functions import of_sympy
+
 if TYPE_CHECKING:
     import sympy as sp
 
     from piazzi.model.derivation import Stage
 
-CALLS = {
-    **{
-        name: name
-        for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sign")
-    },
-    "Abs": "fabs",
-    "Heaviside": "heaviside",
-}
-
-
-_SLOW = 4  # cycles of a root, a quotient or a function, in multiplications
+_SLOW = 4  # cycles of a root or a quotient, in multiplications
 
 
 class _Writer:
@@ -60,8 +52,7 @@ class _Writer:
         """Roughly how many operations come before the value of `e` is known."""
         if not e.args:
             return self.depths.get(e, 0)
-        slow = e.is_Function or (e.is_Pow and not (e.exp.is_Integer and e.exp > 0))
-        return max(self.depth(a) for a in e.args) + (_SLOW if slow else 1)
+        return max(self.depth(a) for a in e.args) + _cost(e)
 
     def temporary(self, text: str) -> str:
         if text not in self.temporaries:
@@ -136,16 +127,23 @@ class _Writer:
         return f"{rest}*{b}" if k % 2 else rest
 
     def _call(self, e: sp.Expr) -> str:
-        name = type(e).__name__
-        if name in ("Max", "Min"):
+        function = of_sympy(e)
+        if function is None:
+            raise ValueError(f"no compiled form for {type(e).__name__!r} in {e}")
+        if function.variadic:
             text = self.atom(e.args[0])
             for other in e.args[1:]:
-                text = f"{name.lower()}imum({text}, {self.atom(other)})"
+                text = f"{function.kernel}({text}, {self.atom(other)})"
             return text
-        if name == "exp" or name in CALLS:
-            args = e.args[:1] if name == "Heaviside" else e.args
-            return f"{CALLS.get(name, name)}({', '.join(self.text(a) for a in args)})"
-        raise ValueError(f"no compiled form for {name!r} in {e}")
+        return f"{function.kernel}({', '.join(self.text(a) for a in e.args[: function.arity])})"
+
+
+def _cost(e: sp.Expr) -> int:
+    """Cycles of the operation at the root of an expression, in multiplications."""
+    if e.is_Function:
+        function = of_sympy(e)
+        return function.cost if function else _SLOW
+    return _SLOW if e.is_Pow and not (e.exp.is_Integer and e.exp > 0) else 1
 
 
 def _is_literal(text: str) -> bool:

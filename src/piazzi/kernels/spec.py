@@ -5,12 +5,14 @@ from __future__ import annotations
 import ast
 import hashlib
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from piazzi.expressions.functions import TABLE
 from piazzi.model import Model
 
 HERE = Path(__file__).parent
@@ -42,7 +44,8 @@ class KernelSpec:
     def digest(self) -> str:
         """Hash of everything that the compiled module depends on, this machine and the generator's own text included."""
         own = tuple(_fragment(name) for name in self.fragments)
-        return hashlib.sha256(repr((self, own, _surroundings())).encode()).hexdigest()[:32]
+        added = tuple((f.name, f.partials, f.code) for f in TABLE.values() if f.code)
+        return hashlib.sha256(repr((self, own, added, _surroundings())).encode()).hexdigest()[:32]
 
     def source(self, backend: str) -> str:
         """The module's source for the "compiled" or the "plain" vocabulary."""
@@ -50,7 +53,8 @@ class KernelSpec:
 
         head = BANNER + f"from piazzi.kernels.{backend} import *\n\n\n"
         body = "\n\n".join(_without_imports(_fragment(name)) for name in self.fragments)
-        return head + model_source(self.model, self.scheme, self.lanes if backend == "compiled" else 1) + body
+        text = model_source(self.model, self.scheme, self.lanes if backend == "compiled" else 1) + body
+        return head + _definitions(text) + text
 
 
 @cache
@@ -75,6 +79,12 @@ def lanes_with(features: Mapping[str, bool]) -> int:
 def lanes_for(n: int) -> int:
     """Lanes that suit a problem of `n` values: one where a row of its matrices fills the machine's registers by itself."""
     return machine_lanes() if n <= FILLS_REGISTERS else 1
+
+
+def _definitions(text: str) -> str:
+    """Code of the language's functions that the text calls and the vocabularies do not have by themselves."""
+    used = [f.code.strip() for f in TABLE.values() if f.code and re.search(rf"\b{f.kernel}\(", text)]
+    return "".join(f"@inline\n{code}\n\n\n" for code in used)
 
 
 def _without_imports(text: str) -> str:

@@ -32,6 +32,11 @@ NODE: tuple[float, ...]
 WEIGHT: tuple[float, ...]
 
 
+# functions of the language, as far as fragments use them
+fabs: Any
+sin: Any
+sinh: Any
+sqrt: Any
 # written by generate.py
 dynamics: Any
 rhs: Any

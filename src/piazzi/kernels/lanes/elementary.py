@@ -1,6 +1,6 @@
 """Elementary functions of numbers and of packs from one source: the same operations, so the same bits with lanes and without.
 
-Errors stay below the bounds in `ULPS`, in units in the last place; tests hold them against wider arithmetic.  Arguments are
+Errors stay below the bounds in the table of functions (`ulps`); tests hold them against wider arithmetic.  Arguments are
 reduced as by Cody and Waite (Software Manual for the Elementary Functions, 1980), with constants whose products with small
 whole numbers are exact; the polynomials are minimax fits (Remez), to 1e-17 of the function.  What a reduction does not cover
 (NaN, infinity, angles beyond a million, numbers that are not normal) is left to the C library, lane by lane.  Hyperbolic
@@ -23,7 +23,6 @@ fabs, sqrt = math.fabs, math.sqrt
 # "contract" lets a*b + c round once; nothing else of fast-math, so that NaN keeps meaning "missing"
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 HELPER: dict[str, Any] = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": HelperPipeline}
-ULPS = {"sin": 2.5, "cos": 2.5, "tan": 4.0, "exp": 1.0, "log": 1.0, "atan2": 2.0, "atan": 2.0, "asin": 2.5, "acos": 3.0}
 
 # pi/2 and ln 2 in parts: the first two (the first) have 33 bits, so that whole multiples up to 2^20 are exact
 QUARTER_TURN = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21)

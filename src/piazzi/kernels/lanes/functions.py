@@ -12,6 +12,7 @@ from numba.core.imputils import lower_builtin
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic
 
+from piazzi.expressions.functions import TABLE
 from piazzi.kernels.lanes.algebra import get, join, widen
 from piazzi.kernels.lanes.kinds import Pack, element, lanes_of
 
@@ -56,8 +57,9 @@ def _register_function(function: Any, lower: Callable[..., Any], arguments: int)
 
 _register_function(math.sqrt, _vector_instruction("sqrt"), 1)
 _register_function(math.fabs, _vector_instruction("fabs"), 1)
-for _function in (math.sinh, math.cosh, math.tanh):
-    _register_function(_function, _lane_by_lane(_function), 1)
+for _f in TABLE.values():
+    if _f.kernel and not _f.code and _f.ulps is None:
+        _register_function(getattr(math, _f.kernel), _lane_by_lane(getattr(math, _f.kernel)), _f.arity)
 _register_function(math.pow, _lane_by_lane(math.pow), 2)
 
 
