@@ -118,10 +118,9 @@ def counted(self, text):
     count[text] += 1
     init(self, text)
 parse._Reader.__init__ = counted
-import piazzi as pz, sys
+import piazzi as pz
 pz.load("b612-range")
-print(max(count.values()), len(count), sorted({"sympy", "numba"} & set(sys.modules)))
+print(max(count.values()))
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.split(maxsplit=1)[0] == "1"
-    assert done.stdout.strip().endswith("[]")
+    assert done.stdout.strip() == "1"
