@@ -20,8 +20,9 @@ class UnscentedKalmanFilter:
     Parameters
     ----------
     alpha : float
-        Spread: the points are alpha sqrt(n + kappa) standard deviations from the mean.  From 1e-4 to 1 in the literature; the
-        accuracy hardly depends on it, but rounding grows as 1 / alpha^2.
+        Spread: the points are alpha sqrt(n + kappa) standard deviations from the mean.  From 1e-4 to 1 in the literature.  At
+        1 the points lie where the belief does, and no weight of the mean is negative; small ones see the mean's neighbourhood
+        alone, which goes wrong where the equations bend within a standard deviation, and rounding grows as 1 / alpha^2.
     beta : float
         What is known of the distribution beyond its covariance; 2 is best for a Gaussian.
     kappa : float
@@ -32,14 +33,15 @@ class UnscentedKalmanFilter:
     Notes
     -----
     Julier and Uhlmann, Proc. IEEE 92 (2004), scaled after Wan and van der Merwe (2000).  A small alpha takes the second
-    derivatives at the mean, one near 1 an average over the distribution.  The points are those of the Cholesky factor, drawn
+    derivatives at the mean, one near 1 an average over the distribution.  With beta 0 the default is the cubature Kalman filter
+    (Arasaratnam and Haykin, IEEE Trans. Automatic Control 54, 2009).  The points are those of the Cholesky factor, drawn
     anew after process noise is added: on linear problems that makes the filter exact.  A root of the covariance is carried (van
     der Merwe and Wan 2001), so singular covariances are ordinary and none turns indefinite.  Angles are averaged as differences
     from the central point's.  Process noise along an interval is the central point's.  All rows of one epoch are measured at
     the same predicted points.
     """
 
-    alpha: float = 0.1
+    alpha: float = 1.0
     beta: float = 2.0
     kappa: float = 0.0
     gate: float | None = None
