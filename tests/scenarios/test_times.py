@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from piazzi.scenarios.faults import Faults
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.times import read_times
-from piazzi.scenarios.units import Units
+from piazzi.units import Units
 
 
 def read(table, units=None):

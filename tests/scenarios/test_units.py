@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from piazzi.scenarios import show
 from piazzi.scenarios.faults import Faults
 from piazzi.scenarios.read import read_scenario
-from piazzi.scenarios.units import DIMENSIONS, TABLE, Units
+from piazzi.units import DIMENSIONS, TABLE, Units
 
 MIXED = """
 units = "{units}"

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.model import Sensor, nearest
+from piazzi.model import Sensor
 from piazzi.problem import Station
+from piazzi.text import nearest
 
 if TYPE_CHECKING:
     from piazzi.evaluate.observable import Addition

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.model import nearest
-from piazzi.scenarios.units import TABLE
+from piazzi.text import nearest
+from piazzi.units import TABLE
 
 if TYPE_CHECKING:
     from piazzi.problem.checks import Array

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from importlib import import_module
 
 import click
 
 from piazzi import __version__
 from piazzi.cli.options import Group
+from piazzi.text import nearest
 
 COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "study", "windows", "observability", "report")
 
@@ -27,9 +27,7 @@ class Commands(Group):
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         if args and not args[0].startswith("-") and args[0] not in COMMANDS:
-            close = get_close_matches(args[0], COMMANDS, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(COMMANDS)}"
-            ctx.fail(f"unknown command {args[0]!r}; {hint}")
+            ctx.fail(f"unknown command {args[0]!r}{nearest(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
 
 

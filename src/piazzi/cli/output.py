@@ -35,7 +35,7 @@ def print_rich(*parts: Any) -> None:
     """Tables and text on stdout: coloured on a terminal, plain and unwrapped in a pipe.  A plain string is never wrapped."""
     from rich.console import Console
 
-    from piazzi.evaluate.quantities import printable
+    from piazzi.text import printable
 
     class Plain(Console):
         def on_broken_pipe(self) -> None:
@@ -128,7 +128,7 @@ def _cell(value: Any) -> Any:
     """Text that nothing is hidden in, and that no spreadsheet takes for a formula; anything else as it is."""
     if not isinstance(value, str):
         return value
-    from piazzi.evaluate.quantities import printable
+    from piazzi.text import printable
 
     text = printable(value)
     return f"'{text}" if text[:1] in ("=", "+", "-", "@") else text

@@ -13,6 +13,8 @@ from typing import Any
 
 import click
 
+from piazzi.text import printable
+
 DONE, INTERNAL, BAD_INPUT, NOT_ESTIMATED = 0, 1, 2, 3
 INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 and the number of the signal, as shells report it
 _LONGEST = 600
@@ -90,8 +92,7 @@ def _told(error: Exception) -> tuple[int, str]:
 
 def say(message: str, *, prefix: str = "piazzi: ") -> None:
     """Write one line to stderr, whatever the message contains."""
-    text = " ".join(str(message).split())
-    text = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+    text = printable(" ".join(str(message).split()))
     if len(text) > _LONGEST:
         text = text[: _LONGEST - 4] + " ..."
     with suppress(OSError, ValueError, AttributeError):  # where nobody listens any more

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any, cast
 
 from piazzi.estimate.estimator import Estimator, View
-from piazzi.model import nearest
+from piazzi.text import nearest
 
 GATE, ITERATIONS = 0.999, 5  # where the text gives no number
 

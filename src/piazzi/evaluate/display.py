@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, printable, sigma_factor, unit_of
+from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, sigma_factor, unit_of
 from piazzi.model import Model
+from piazzi.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult

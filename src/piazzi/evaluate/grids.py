@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from piazzi.evaluate.quantities import NOTHING, printable
+from piazzi.evaluate.quantities import NOTHING
+from piazzi.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions

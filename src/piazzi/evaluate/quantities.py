@@ -79,11 +79,6 @@ def duration(seconds: float | None) -> str:
     return f"{number(seconds * 1e6, 3)} us" if seconds > 0 else "0 s"
 
 
-def printable(text: str) -> str:
-    """Text of a user's file without what would steer a terminal: control characters are written out."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
-
-
 def finite(value: float | None) -> float | None:
     """The number, None where it is not finite: JSON has no other."""
     return float(value) if value is not None and isfinite(value) else None

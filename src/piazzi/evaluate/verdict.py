@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from piazzi.estimate.chi_square import quantile
-from piazzi.evaluate.quantities import display_of, number, printable
+from piazzi.evaluate.quantities import display_of, number
 from piazzi.problem.checks import Array
+from piazzi.text import printable
 
 if TYPE_CHECKING:
     from piazzi.evaluate.observable import Observability

@@ -11,13 +11,14 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from piazzi.expressions.bounds import read
-from piazzi.expressions.errors import ExpressionError, quote, suggest
+from piazzi.expressions.errors import ExpressionError, quote
 from piazzi.expressions.functions import arities
 from piazzi.expressions.language import CONSTANTS
 from piazzi.expressions.numeric import evaluate, evaluate_arrays
 from piazzi.expressions.parse import Equation, is_name
 from piazzi.expressions.symbolic import build, symbol
 from piazzi.expressions.writing import write
+from piazzi.text import suggest
 
 if TYPE_CHECKING:
     import sympy as sp

@@ -1,8 +1,8 @@
-"""The one error of the equation language, and the wording it shares: excerpts on one line, and the nearest valid name."""
+"""The one error of the equation language, and the wording it shares: excerpts on one line."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from piazzi.text import printable
 
 EXCERPT = 60
 QUOTE = 24
@@ -34,23 +34,10 @@ class ExpressionError(ValueError):
 
 def quote(text: str) -> str:
     """Return `text` in quotes, escaped and short enough to stand inside a message."""
-    return f"'{_escape(text if len(text) <= QUOTE else text[:QUOTE] + '...')}'"
-
-
-def suggest(name: str, valid: Iterable[str]) -> str:
-    """Return "; did you mean ...?" with the valid name nearest to `name`, or nothing when none is near."""
-    import difflib
-
-    folded = {candidate.casefold(): candidate for candidate in sorted(valid)}
-    near = difflib.get_close_matches(name.casefold(), folded, n=1)
-    return f"; did you mean {quote(folded[near[0]])}?" if near else ""
+    return f"'{printable(text if len(text) <= QUOTE else text[:QUOTE] + '...')}'"
 
 
 def _excerpt(text: str, column: int) -> str:
     start = max(0, min(column - 1 - EXCERPT // 2, len(text) - EXCERPT))
     end = start + EXCERPT
-    return ("..." if start else "") + _escape(text[start:end]) + ("..." if end < len(text) else "")
-
-
-def _escape(text: str) -> str:
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    return ("..." if start else "") + printable(text[start:end]) + ("..." if end < len(text) else "")

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from piazzi.expressions.errors import ExpressionError, quote, suggest
+from piazzi.expressions.errors import ExpressionError, quote
 from piazzi.expressions.functions import TABLE, arities
 from piazzi.expressions.language import (
     CONSTANTS,
@@ -37,6 +37,7 @@ from piazzi.expressions.language import (
     Sum,
 )
 from piazzi.expressions.tokens import Token, tokenize
+from piazzi.text import suggest
 
 ALIASES = {"ln": "log", "sgn": "sign", "fabs": "abs", "pow": "**"}
 

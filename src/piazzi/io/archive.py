@@ -13,9 +13,9 @@ from typing import IO, Any
 
 import numpy as np
 
-from piazzi.model import nearest
 from piazzi.problem.checks import Array
 from piazzi.sources import opened
+from piazzi.text import nearest, printable
 
 # An archive may hold this much, or this many times its own size if that is more: real measurements do not shrink further.
 FREE_BYTES = 64 * 2**20
@@ -96,4 +96,4 @@ def _header(stream: IO[bytes], key: str) -> tuple[np.dtype[Any], tuple[int, ...]
 def _one_line(error: BaseException) -> str:
     """The first line of an error's text, or its kind."""
     text = (str(error.args[0] if error.args and isinstance(error.args[0], str) else error).splitlines() or [""])[0][:200]
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text) or type(error).__name__
+    return printable(text) or type(error).__name__

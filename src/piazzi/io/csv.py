@@ -14,10 +14,10 @@ import numpy as np
 
 from piazzi.io.atomic import atomic_path
 from piazzi.io.cells import STATION, Cells, read_cells
-from piazzi.model import nearest
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, backwards, check_span
-from piazzi.scenarios.units import Unit, Units
+from piazzi.text import nearest
+from piazzi.units import Unit, Units
 
 if TYPE_CHECKING:
     from piazzi.estimate import Estimate

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.model import nearest
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.text import nearest
 
 if TYPE_CHECKING:
     from piazzi.estimate import Estimate

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from piazzi.problem.checks import Array
-from piazzi.scenarios.faults import one_line
 from piazzi.sources import opened as opened_file
+from piazzi.text import one_line
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 # A data set may hold this much, or this many times its size in the file if that is more

@@ -6,8 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from piazzi.model.model import Model, nearest
+from piazzi.model.model import Model
 from piazzi.model.sensor import Parameter
+from piazzi.text import nearest
 
 
 def driven_states(model: Model, states: str | Sequence[str]) -> tuple[str, ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from difflib import get_close_matches
 from functools import cached_property
 from typing import Any
 
@@ -12,18 +11,10 @@ from piazzi.expressions import names
 from piazzi.model.definitions import definitions_of, needed, unused
 from piazzi.model.naming import name_of, text_of
 from piazzi.model.sensor import Parameter, Sensor, several
+from piazzi.text import nearest
 
 TIME = "t"
 STEP = "dt"
-
-
-def nearest(name: str, valid: Any) -> str:
-    """'; did you mean ...?' with the nearest valid name, or the list of them, for error messages."""
-    options = [str(v) for v in valid]
-    close = get_close_matches(str(name), options, n=1)
-    if close:
-        return f"; did you mean {close[0]!r}?"
-    return f"; known: {', '.join(options)}" if options else ""
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, printable, unit_of
+from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, unit_of
 from piazzi.problem.checks import Array
 from piazzi.study import Line, Stored, Summary
+from piazzi.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult

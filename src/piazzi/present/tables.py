@@ -8,8 +8,9 @@ import numpy as np
 
 from piazzi.estimate import Estimate, Forecast
 from piazzi.evaluate.metrics import errors, residual_rms
-from piazzi.evaluate.quantities import display_of, duration, number, printable, with_sigma
+from piazzi.evaluate.quantities import display_of, duration, number, with_sigma
 from piazzi.problem import Problem, Tracking
+from piazzi.text import printable
 
 
 def heading(problem: Problem, tracking: Tracking, source: str, remark: str = "") -> Any:

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from piazzi.model import Model, Parameter, Sensor, nearest
+from piazzi.model import Model, Parameter, Sensor
 from piazzi.problem.parts import Gaussian, Station
+from piazzi.text import nearest
 
 
 def with_station_constants(

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from piazzi.model import Model, nearest
+from piazzi.model import Model
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
 from piazzi.problem.parts import Manoeuvre
+from piazzi.text import nearest
 
 
 def checked(manoeuvres: Manoeuvre | Sequence[Manoeuvre], model: Model) -> tuple[Manoeuvre, ...]:

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.expressions.errors import suggest
 from piazzi.kernels import Discrete, Integrator, Kepler, KernelSpec, RungeKutta4
-from piazzi.model import Model, nearest
+from piazzi.model import Model
 from piazzi.problem import functions, manoeuvres
 from piazzi.problem.checks import Array, check_span, covariance, finite_vector, frozen, lock, numeric
 from piazzi.problem.composition import composed
 from piazzi.problem.constants import with_station_constants
 from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
 from piazzi.problem.two_body import check_orbit_axes, check_two_body
+from piazzi.text import nearest, suggest
 
 MOST_KINDS = 100  # beyond so many kinds of problem, those are forgotten for which no kernel was wanted
 _SPECS: dict[tuple[Any, ...], dict[tuple[Any, ...], KernelSpec]] = {}

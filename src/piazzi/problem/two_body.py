@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from piazzi.expressions import evaluate
 from piazzi.kernels import Kepler
-from piazzi.model import Model, nearest
+from piazzi.model import Model
 from piazzi.model.definitions import with_values
+from piazzi.text import nearest
 
 if TYPE_CHECKING:
     from piazzi.problem.problem import Problem

@@ -8,11 +8,12 @@ from functools import lru_cache
 from typing import Any, get_args
 
 from piazzi.expressions import check
-from piazzi.model import STEP, TIME, Model, Parameter, Role, Sensor, nearest
+from piazzi.model import STEP, TIME, Model, Parameter, Role, Sensor
 from piazzi.model.naming import name_of
 from piazzi.scenarios.faults import shown
 from piazzi.scenarios.table import Table
-from piazzi.scenarios.units import ONE, Unit, Units
+from piazzi.text import nearest
+from piazzi.units import ONE, Unit, Units
 
 MAX_STATES = 100
 OWN = "; numbers of each station's own are named in the sensor's numbers"

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
+from piazzi.text import one_line
+
 _BARE = re.compile(r"[A-Za-z0-9_-]{1,60}")
 
 
@@ -42,12 +44,6 @@ class Faults(list[Fault]):
             yield
         except ValueError as error:
             self.add(path, str(error))
-
-
-def one_line(text: str) -> str:
-    """The text on one line of sane length, with control characters escaped."""
-    shorter = text if len(text) <= 500 else text[:500] + " ..."
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in shorter)
 
 
 def shown(value: Any) -> str:

@@ -9,7 +9,7 @@ from piazzi.problem import Problem, with_gauss_markov
 from piazzi.scenarios.equations import Physics
 from piazzi.scenarios.manoeuvres import named_states
 from piazzi.scenarios.table import Table
-from piazzi.scenarios.units import Units
+from piazzi.units import Units
 
 KEYS = ("sigma", "time_constant", "states")
 

@@ -10,7 +10,7 @@ from piazzi import kernels
 from piazzi.kernels import Integrator
 from piazzi.scenarios.faults import shown
 from piazzi.scenarios.table import Table
-from piazzi.scenarios.units import Units
+from piazzi.units import Units
 
 INTEGRATORS: Mapping[str, type[Integrator]] = {
     "taylor": kernels.Taylor,

@@ -9,11 +9,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from piazzi.model import nearest
 from piazzi.scenarios.faults import Fault, Faults, ScenarioError, shown
 from piazzi.scenarios.read import read_scenario
 from piazzi.scenarios.scenario import Scenario
 from piazzi.sources import opened
+from piazzi.text import nearest
 
 FILES = Path(__file__).parent / "files"
 TEMPLATE = "template"

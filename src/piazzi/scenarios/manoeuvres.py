@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.model import nearest
 from piazzi.problem import Manoeuvre
 from piazzi.scenarios.equations import Physics
 from piazzi.scenarios.faults import shown
 from piazzi.scenarios.quantities import SPREADS, read_spread
 from piazzi.scenarios.table import Table
-from piazzi.scenarios.units import Units
+from piazzi.text import nearest
+from piazzi.units import Units
 
 VELOCITY = "velocity"
 

@@ -14,7 +14,7 @@ from piazzi.problem.constants import constant_name
 from piazzi.scenarios.equations import Physics
 from piazzi.scenarios.faults import shown
 from piazzi.scenarios.table import Table
-from piazzi.scenarios.units import ONE, Units
+from piazzi.units import ONE, Units
 
 SPREADS = ("sigma", "variance", "covariance")
 

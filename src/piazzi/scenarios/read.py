@@ -20,7 +20,7 @@ from piazzi.scenarios.studies import read_plan
 from piazzi.scenarios.table import Table
 from piazzi.scenarios.times import read_times
 from piazzi.scenarios.truth import read_truth
-from piazzi.scenarios.units import Units
+from piazzi.units import Units
 
 SECTIONS = (
     "title", "units", "states", "memory", "groups", "definitions", "dynamics", "step", "parameters", "sensors", "stations",

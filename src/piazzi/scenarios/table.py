@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.model import nearest
 from piazzi.problem.checks import Array
 from piazzi.scenarios.faults import Faults, joined, shown
+from piazzi.text import nearest
 
 MAX_TABLES = 1000
 MAX_UNKNOWN = 50

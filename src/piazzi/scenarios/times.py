@@ -9,7 +9,7 @@ import numpy as np
 from piazzi.problem.checks import Array, check_span
 from piazzi.scenarios.faults import shown
 from piazzi.scenarios.table import Table
-from piazzi.scenarios.units import Units
+from piazzi.units import Units
 
 MAX_EPOCHS = 10**7
 

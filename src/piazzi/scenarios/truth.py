@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from piazzi.expressions import check
-from piazzi.model import nearest
 from piazzi.problem import Gaussian, ProcessNoise, Truth
 from piazzi.scenarios.equations import Physics
 from piazzi.scenarios.faults import joined, shown
@@ -13,7 +12,8 @@ from piazzi.scenarios.integrators import read_integrator
 from piazzi.scenarios.manoeuvres import read_manoeuvres
 from piazzi.scenarios.quantities import read_noise
 from piazzi.scenarios.table import Table
-from piazzi.scenarios.units import Units
+from piazzi.text import nearest
+from piazzi.units import Units
 
 MOST_TEXTS = 100
 

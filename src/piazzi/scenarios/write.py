@@ -14,7 +14,7 @@ from piazzi.scenarios.integrators import write_integrator
 from piazzi.scenarios.manoeuvres import write_manoeuvre
 from piazzi.scenarios.read import read_problem
 from piazzi.scenarios.table import Table
-from piazzi.scenarios.units import Labels
+from piazzi.units import Labels
 
 SECTIONS = (
     "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise",

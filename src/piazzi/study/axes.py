@@ -9,8 +9,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from piazzi.model import nearest
 from piazzi.problem import Gaussian, Problem, Station
+from piazzi.text import nearest
 
 ASSUMED, TRUTH = "assumed.", "truth."
 Value = int | float | str

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from piazzi.evaluate.quantities import printable
 from piazzi.present.figures.pages import save
 from piazzi.present.figures.style import RC, label_of, line_of, plain, plain_ticks, time_axis
 from piazzi.present.studies import group_display, ideal_nees, point_name, widest_bounds
 from piazzi.study import Line, Summary
+from piazzi.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.evaluate.quantities import Display, printable
+from piazzi.evaluate.quantities import Display
 from piazzi.present import colours
 from piazzi.present.colours import COLOURS, MEASURED, PLANET, STATIONS, TRUTH, colour_of, dash_of, shade_of, shades
 from piazzi.problem.checks import Array
+from piazzi.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,10 +8,11 @@ from hashlib import sha256
 from importlib.resources import files
 from typing import Any
 
-from piazzi.evaluate.quantities import Display, printable
+from piazzi.evaluate.quantities import Display
 from piazzi.present.report.blocks import Axis, Block, Chart, Line, Now, Orbit, Section, Tab, Table, Text, Track
 from piazzi.present.report.encode import Pool, script_json
 from piazzi.present.report.pieces import legend, line_mark, summary_point, tab_chooser, table_panel, text
+from piazzi.text import printable
 
 SCRIPTS = ("data.js", "scales.js", "chart.js", "orbit.js", "tab.js", "page.js")
 

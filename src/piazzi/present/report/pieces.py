@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from piazzi.evaluate.quantities import printable
 from piazzi.present.report.blocks import Key, Line, Point, Tab, Table
+from piazzi.text import printable
 
 
 def text(words: str) -> str:

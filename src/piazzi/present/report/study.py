@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from piazzi.evaluate.quantities import Display, number, printable
+from piazzi.evaluate.quantities import Display, number
 from piazzi.present.colours import dash_of, label_of, shades
 from piazzi.present.figures.style import time_display
 from piazzi.present.report.blocks import Axis, Chart, Key, Line, Point, Section, Tab, Table, Text
@@ -14,6 +14,7 @@ from piazzi.present.studies import columns, failures, group_display, heading, id
 from piazzi.problem.checks import Array
 from piazzi.study import Line as Result
 from piazzi.study import Summary
+from piazzi.text import printable
 
 MOST_TABS = 12
 _READING = (

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from piazzi.model import nearest
+from piazzi.text import nearest
 
 DIMENSIONS = ("length", "angle", "time", "mass")
 SI = ("m", "rad", "s", "kg")

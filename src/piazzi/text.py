@@ -1,0 +1,42 @@
+"""Words of messages: what a user wrote on one printable line, and the valid name that was probably meant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+LONGEST = 500
+
+
+def printable(text: str) -> str:
+    """The text with control characters written out, so that nothing in it steers a terminal."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def one_line(text: str, longest: int = LONGEST) -> str:
+    """The text on one line of sane length, with control characters written out."""
+    return printable(text if len(text) <= longest else text[:longest] + " ...")
+
+
+def suggestion(name: str, valid: Iterable[object]) -> str:
+    """The valid name nearest to `name`, upper and lower case aside, "" where none is near."""
+    from difflib import get_close_matches
+
+    options = [str(v) for v in valid]
+    near = get_close_matches(str(name), options, n=1)
+    if near:
+        return near[0]
+    folded = {option.casefold(): option for option in sorted(options)}
+    near = get_close_matches(str(name).casefold(), folded, n=1)
+    return folded[near[0]] if near else ""
+
+
+def suggest(name: str, valid: Iterable[object]) -> str:
+    """'; did you mean ...?' with the nearest valid name, nothing where none is near."""
+    near = suggestion(name, valid)
+    return f"; did you mean {near!r}?" if near else ""
+
+
+def nearest(name: str, valid: Iterable[object]) -> str:
+    """'; did you mean ...?' with the nearest valid name, or the list of them."""
+    options = [str(v) for v in valid]
+    return suggest(name, options) or (f"; known: {', '.join(options)}" if options else "")
