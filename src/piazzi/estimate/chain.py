@@ -34,6 +34,7 @@ def chain_fragments(problem: Problem, *last: str) -> tuple[str, ...]:
         "epoch",
         "innovations",
         "chain",
+        "semidefinite",
         "marginals",
         *last,
     )
@@ -52,7 +53,7 @@ def _solve_spec(n: int, width: int, noise_varies: bool, lanes: int) -> KernelSpe
     names = tuple(f"s{i}" for i in range(n))
     sizes = Model(names, ("0",) * n, (Sensor("any", ["0"] * width),), discrete=True)
     noise = f"chain_noise_{'integral' if noise_varies else 'scaled'}"
-    return KernelSpec(sizes, Discrete().scheme, ("matrices", noise, "chain", "marginals", "graph"), lanes)
+    return KernelSpec(sizes, Discrete().scheme, ("matrices", noise, "chain", "semidefinite", "marginals", "graph"), lanes)
 
 
 def tether_of(problem: Problem) -> Array:

@@ -49,7 +49,16 @@ class RootKernel:
         self.problem, n, m = problem, problem.model.n, problem.model.width
         assert problem.integrator is not None
         together = root.fragment == "root_unscented" and problem.integrator.in_lanes and not problem.manoeuvres
-        parts = ("transition", problem.noise_fragment, "epoch_guarded", "triangle", root.fragment, "root", "filter_root")
+        parts = (
+            "transition",
+            problem.noise_fragment,
+            "epoch_guarded",
+            "semidefinite",
+            "triangle",
+            root.fragment,
+            "root",
+            "filter_root",
+        )
         self._library = kernels.load(problem.spec(*parts, lanes=machine_lanes() if together else 1))
         self._numbers = (np.array(root.settings or (0.0,)), Guard(1, root.gate).thresholds(m))
         A = root.unknowns * n

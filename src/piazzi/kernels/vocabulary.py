@@ -21,6 +21,7 @@ WORK: int
 NUMBERS: int
 LANES: int
 GIVEN: int
+LOST: float
 MAX_STEPS: int
 MAX_PANELS: int
 RTOL: float

@@ -2,7 +2,8 @@
 
 from piazzi.kernels.fragments.root import begin_epoch, finish_epoch, take_row
 from piazzi.kernels.fragments.root_linear import advance_root
-from piazzi.kernels.fragments.triangle import covariance_of, root_of
+from piazzi.kernels.fragments.semidefinite import root_of
+from piazzi.kernels.fragments.triangle import covariance_of
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

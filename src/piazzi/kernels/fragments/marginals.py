@@ -6,32 +6,25 @@ Rauch, Tung and Striebel divide by the predicted covariance instead, which fails
 forgets its past: P_pred turns singular.
 """
 
+from piazzi.kernels.fragments.semidefinite import root_of
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def next_direction(rows, j, lanes):
-    """Row r_j of A = sum of r_j^T r_j, by Cholesky, in the place of row j of A; those before it are there already.
+def next_direction(rows, j):
+    """Row r_j of A = sum of r_j^T r_j, by Cholesky, in its place, of `LANES` matrices; and 1 where its pivot is lost.
 
-    A direction in which A is zero to rounding gives a row of zeros.
+    Those before it are there already.
     """
-    whole = load_packs(rows, (j * N + j) * lanes, 1, lanes)[0]
-    row = load_packs(rows, j * N * lanes, N, lanes)
+    whole = load_packs(rows, (j * N + j) * LANES, 1, LANES)[0]
+    row = load_packs(rows, j * N * LANES, N, LANES)
     for k in range(j):
-        row = row - load_packs(rows, (k * N + j) * lanes, 1, lanes)[0] * load_packs(rows, k * N * lanes, N, lanes)
-    store_packs(rows, j * N * lanes, row, lanes)
-    pivot = load_packs(rows, (j * N + j) * lanes, 1, lanes)[0]
-    h = choose(pivot, 1e-15 * whole, 1.0 / sqrt(pivot), 0.0) * row
-    store_packs(rows, j * N * lanes, h, lanes)
-    return h
-
-
-@inline
-def directions(A, rows):
-    """Rows r_j with A = sum of r_j^T r_j; see `next_direction`."""
-    store(rows, 0, A)
-    for j in range(N):
-        next_direction(rows, j, 1)
+        row = row - load_packs(rows, (k * N + j) * LANES, 1, LANES)[0] * load_packs(rows, k * N * LANES, N, LANES)
+    store_packs(rows, j * N * LANES, row, LANES)
+    pivot = load_packs(rows, (j * N + j) * LANES, 1, LANES)[0]
+    h = choose(pivot, LOST * whole, 1.0 / sqrt(pivot), 0.0) * row
+    store_packs(rows, j * N * LANES, h, LANES)
+    return h, choose(LOST * whole, pivot, 1.0, 0.0)
 
 
 @inline
@@ -63,22 +56,50 @@ def forget(Y, T, noise, amount, keep_cross):
 
 
 @inline
-def inform(at, stride, own, covariance, rows):
+def informed(P, h):
+    """Covariances after one measurement of unit noise, in Joseph form."""
+    Ph = h @ P
+    K = (1.0 / (h @ Ph + 1.0)) * Ph
+    B = plus_outer(P, -Ph, K)
+    return plus_outer(B, K, K - h @ B)
+
+
+@inline
+def inform(at, stride, own, covariance, rows, lost):
     """Covariances of `LANES` states, at `at`, `at + stride`, ..., in the place of their information, in Joseph form.
 
     Each covariance given all measurements so far, in `own`, takes the information of later ones in as measurements of unit
-    noise: its directions, one after the other as they become known.
+    noise: its directions, one after the other as they become known.  States whose information lacks directions to rounding are
+    done by themselves.
     """
     for i in range(N):
         store_packs(rows, i * N * LANES, load_lanes(covariance, at + i * N, N, stride, LANES), LANES)
     P = load_matrices(own, 0, N, N, stride, LANES)
+    h, missing = next_direction(rows, 0)
+    P = informed(P, h)
+    for j in range(1, N):
+        h, lacks = next_direction(rows, j)
+        missing = missing + lacks
+        P = informed(P, h)
+    store_packs(lost, 0, vector(missing), LANES)
+    together = 0.0
+    for lane in range(LANES):
+        together += lost[lane]
+    if together == 0.0:
+        store_lanes(covariance, at, stride, symmetric(P))
+    else:
+        for lane in range(LANES if stride > 0 else 1):
+            inform_alone(at + lane * stride, lane * stride, own, covariance, rows)
+
+
+@inline
+def inform_alone(at, own_at, own, covariance, rows):
+    """As `inform`, of one state."""
+    root_of(load_matrix(covariance, at, N, N), rows, 0)
+    P = load_matrix(own, own_at, N, N)
     for j in range(N):
-        h = next_direction(rows, j, LANES)
-        Ph = h @ P
-        K = (1.0 / (h @ Ph + 1.0)) * Ph
-        B = plus_outer(P, -Ph, K)
-        P = plus_outer(B, K, K - h @ B)
-    store_lanes(covariance, at, stride, symmetric(P))
+        P = informed(P, load_vector(rows, j * N, N))
+    store(covariance, at, symmetric(P))
 
 
 @inline
@@ -90,16 +111,16 @@ def marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P
     of it: a rough one beside precise ones of later states would be lost in the sum.
     """
     base = first_row[a]
-    rows, own, g = scratch(NN_LANES), scratch(NN_LANES), scratch(NN)
+    rows, own, g, lost = scratch(NN_LANES), scratch(NN_LANES), scratch(NN), scratch(LANES)
     Y = 0.0 * P_last
-    directions(Q, g)
+    root_of(Q, g, 0)
     for b in range(1, W):
         j = W - 1 - b
         k = a + j
         Y = information_before((first_row[k + 1] - base) * M, (first_row[k + 2] - base) * M, nu, H, Y)
         amount = scale[k + 1]
         if noise_varies():
-            directions(noise_at(j + 1, amount, Q, Q_all), g)
+            root_of(noise_at(j + 1, amount, Q, Q_all), g, 0)
             amount = 1.0
         Y, T = forget(Y, identity(N), g, amount, keep_cross)
         F = load_matrix(Phi, j * N * N, N, N)
@@ -115,7 +136,7 @@ def marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P
             P = load_matrix(P_pred, (j + lane) * N * N, N, N)
             _, P, _ = absorb_epoch((first - base) * M, (last - base) * M, unit(-1, N), P, nu, H)
             store(own, lane * N * N, P)
-        inform((a + j) * N * N, N * N if together > 1 else 0, own, covariance, rows)
+        inform((a + j) * N * N, N * N if together > 1 else 0, own, covariance, rows, lost)
         j += together
     store(covariance, (a + W - 1) * N * N, symmetric(P_last))
     if keep_cross:

@@ -1,6 +1,7 @@
 """A root carried and measured by Jacobians: the extended Kalman filter."""
 
-from piazzi.kernels.fragments.triangle import keep_root, root_of, triangularize_rows
+from piazzi.kernels.fragments.semidefinite import root_of
+from piazzi.kernels.fragments.triangle import keep_root, triangularize_rows
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

@@ -10,7 +10,8 @@ where (1 + c N)^2 = 1 + w N / eta^2: a root, so P is semidefinite whatever the p
 central point's, wrapped.  Points are drawn anew after process noise was added: those that were carried lack it.
 """
 
-from piazzi.kernels.fragments.triangle import keep_root, root_of, triangularize_rows
+from piazzi.kernels.fragments.semidefinite import root_of
+from piazzi.kernels.fragments.triangle import keep_root, triangularize_rows
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

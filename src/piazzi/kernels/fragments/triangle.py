@@ -4,22 +4,6 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def root_of(P, rows, at):
-    """N rows for a semidefinite P, by Cholesky, from position `at`; a direction without variance gives a row of zeros."""
-    store(rows, at, P)
-    for j in range(N):
-        whole = rows[at + j * N + j]
-        row = load_vector(rows, at + j * N, N)
-        for k in range(j):
-            row = row - rows[at + k * N + j] * load_vector(rows, at + k * N, N)
-        store(rows, at + j * N, row)
-        pivot = rows[at + j * N + j]
-        store(rows, at + j * N, (0.0 if pivot <= 1e-15 * whole else 1.0 / sqrt(pivot)) * row)
-        for k in range(j):
-            rows[at + j * N + k] = 0.0
-
-
-@inline
 def triangularize_rows(rows, many):
     """The same P from N rows, an upper triangle, by Householder's reflections; what is below is used up."""
     for j in range(N):
