@@ -88,6 +88,24 @@ def imports() -> int:
     return failures
 
 
+def same_bits(folder: Path) -> int:
+    """1 if numbers of a large table, which pandas reads, are not those that were written; else 0."""
+    import numpy as np
+
+    import piazzi as pz
+    from piazzi.io.csv import read_csv, write_csv
+
+    rng = np.random.default_rng(0)
+    problem = pz.load(folder / "own.toml")[0]
+    written = pz.Tracking(np.cumsum(1.0 + rng.random(30_000)) * 1e5, rng.standard_normal((30_000, 2)) * 1e8)
+    write_csv(folder / "large.csv", problem, written)
+    read = read_csv(folder / "large.csv", problem)
+    wrong = int((read.values != written.values).sum() + (read.times != written.times).sum())
+    if wrong:
+        print(f"FAILED  {wrong} of {3 * len(read.times)} numbers of a large .csv file are not as they were written")
+    return bool(wrong)
+
+
 def readable(path: Path) -> None:
     """Return where the file holds what its ending says; raises if not."""
     import numpy as np
@@ -137,6 +155,7 @@ def smoke(folder: Path) -> int:
         print(f"{'FAILED' if what else 'ok':6} {time.monotonic() - started:5.1f} s  piazzi {words}  {what}", flush=True)
         for line in said:
             print(f"           {line}")
+    failures += same_bits(folder)
     for words in USAGE:
         status, _, said = run(words, folder)
         if status != 2 or not said[-1].startswith("piazzi: ") or any("Traceback" in line for line in said):

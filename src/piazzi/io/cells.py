@@ -116,7 +116,7 @@ def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -
     try:
         table = pd.read_csv(
             io.BytesIO(body), header=None, index_col=False, dtype=kinds, na_values=[""], keep_default_na=False,
-            skip_blank_lines=False, engine="c", low_memory=False,
+            skip_blank_lines=False, engine="c", low_memory=False, **_exact(pd.__version__),
         )  # fmt: skip
     except (ValueError, OverflowError):  # among them all of pandas' own errors of parsing
         return None
@@ -131,6 +131,12 @@ def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -
         if "" in names or (station < 0).any():
             return None
     return Cells(comments, numbers, station, names, range(line, line + len(table)))
+
+
+def _exact(version: str) -> dict[str, str]:
+    """What has pandas round numbers as Python does: from 3.1 on it always does, and asking for it is deprecated."""
+    major, minor = map(int, version.split(".")[:2])
+    return {"float_precision": "round_trip"} if (major, minor) < (3, 1) else {}
 
 
 def _is_regular(body: bytes, columns: int) -> bool:
