@@ -298,3 +298,14 @@ def test_runs_that_are_none_of_the_study_are_run_again(whole, tmp_path, task):
     log.close()
     run_study(study, path, workers=0, resume=True)
     assert same_results(expected, path) == []
+
+
+def test_runs_in_other_lanes_are_not_gone_on_with(tmp_path, monkeypatch):
+    """A study begun with one lane and gone on with in four had bits of both."""
+    study, path = small(runs=20), tmp_path / "s.nc"
+    here = versions.fingerprint()["lanes"]
+    monkeypatch.setattr(versions, "machine_lanes", lambda: 16)
+    execute._log(study, path.with_name("s.nc.runs"), False).close()
+    monkeypatch.undo()
+    with pytest.raises(ValueError, match=rf"was begun by lanes 16, not {here} as here: results would not be the same"):
+        run_study(study, path, workers=0, resume=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import secrets
 import shutil
 import stat
 import tempfile
@@ -85,7 +84,7 @@ def _beside(target: Path) -> Path:
     """
     mode = 0o600 if target.exists() else 0o666
     while True:
-        work = target.with_name(f".{target.stem[:40]}-{secrets.token_hex(4)}{target.suffix[-40:]}")
+        work = target.with_name(f".{target.stem[:40]}-{os.urandom(4).hex()}{target.suffix[-40:]}")
         with suppress(FileExistsError):
             os.close(os.open(work, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
             return work

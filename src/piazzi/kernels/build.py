@@ -8,6 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from piazzi.kernels.library import INTEGER, POINTER, REAL, PlainEntry
+from piazzi.kernels.settings import own_settings
 
 
 def import_file(path: Path) -> ModuleType:
@@ -28,15 +29,16 @@ def plain_entries(path: Path, names: tuple[str, ...]) -> dict[str, PlainEntry]:
 
 def compile_entries(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     """Object code of each entry, and its symbol with the kinds of its arguments."""
-    from numba import types
+    with own_settings():
+        from numba import types
 
-    module = import_file(path)
-    kinds = {types.int64: INTEGER, types.float64: REAL}
-    objects, symbols = {}, {}
-    for name in names:
-        callback: Any = getattr(module, name)
-        objects[name] = callback._library.object_code()
-        symbols[name] = (callback.native_name, tuple(kinds.get(a, POINTER) for a in callback._sig.args))
+        module = import_file(path)
+        kinds = {types.int64: INTEGER, types.float64: REAL}
+        objects, symbols = {}, {}
+        for name in names:
+            callback: Any = getattr(module, name)
+            objects[name] = callback._library.object_code()
+            symbols[name] = (callback.native_name, tuple(kinds.get(a, POINTER) for a in callback._sig.args))
     return objects, symbols
 
 

@@ -7,16 +7,17 @@ import hashlib
 import json
 import logging
 import os
-import shutil
 import tempfile
+import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 from piazzi.kernels.build import compile_entries, entry_names, plain_entries
-from piazzi.kernels.folder import private_folder, writable_folder
+from piazzi.kernels.folder import Folder, private_folder, writable_folder
 from piazzi.kernels.library import load_objects
+from piazzi.kernels.settings import may_be_kept
 from piazzi.kernels.spec import KernelSpec
 
 LOGGER = logging.getLogger("piazzi.kernels")
@@ -26,6 +27,7 @@ _environment: Any = getattr(os.environ, "_data", os.environ)
 _JIT, _OFF = ("PIAZZI_JIT", "0") if _environment is os.environ else map(os.environ.encodekey, ("PIAZZI_JIT", "0"))
 _spent: list[float] = []
 _loaded: dict[tuple[KernelSpec, bool], SimpleNamespace] = {}
+_making = threading.RLock()  # what is made may ask for another kernel
 
 
 def is_compiled() -> bool:
@@ -40,11 +42,28 @@ def load(spec: KernelSpec) -> SimpleNamespace:
     """
     compiled = is_compiled()
     found = _loaded.get((spec, compiled))
-    if found is None:
-        started = time.perf_counter()
-        found = _loaded[spec, compiled] = _from_disk_or_built(spec) if compiled else _plain(spec)
-        _spent.append(time.perf_counter() - started)
-    return found
+    return _made(spec, compiled) if found is None else found
+
+
+def _made(spec: KernelSpec, compiled: bool) -> SimpleNamespace:
+    """The entries, by one thread at a time: the others wait for what it makes, which is sooner than to make it as well."""
+    with _making:
+        found = _loaded.get((spec, compiled))
+        if found is None:
+            started = time.perf_counter()
+            found = _loaded[spec, compiled] = _from_disk_or_built(spec) if compiled else _plain(spec)
+            _spent.append(time.perf_counter() - started)
+        return found
+
+
+def _renew_lock() -> None:
+    """In a new process the thread that held the lock is not there."""
+    global _making  # noqa: PLW0603
+    _making = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew_lock)
 
 
 def build_seconds() -> float:
@@ -62,78 +81,91 @@ def _plain(spec: KernelSpec) -> SimpleNamespace:
 
 def _from_disk_or_built(spec: KernelSpec) -> SimpleNamespace:
     digest, (place, _) = spec.digest(), private_folder()
-    entries = _read(place / digest) if place else None
+    entries = _read(place, digest) if place else None
     if entries is None:
-        home = writable_folder() / digest
+        home = writable_folder()
         LOGGER.info("compiling %s for %s, once (about 3 to 15 s) ...", spec.fragments[-1], spec.subject)
         started = time.perf_counter()
-        entries = _build(spec, home)
-        LOGGER.debug("compiled in %.1f s into %s", time.perf_counter() - started, home)
+        entries = _build(spec, home, digest)
+        LOGGER.debug("compiled in %.1f s into %s", time.perf_counter() - started, home and home.path / digest)
     return SimpleNamespace(**entries)
 
 
-def _read(home: Path) -> dict[str, Any] | None:
-    """Entries of a finished folder, or None where something is missing, truncated or altered."""
+def _read(place: Folder, digest: str) -> dict[str, Any] | None:
+    """Entries of a finished folder, or None where something is missing, truncated, altered or not ours."""
     try:
-        manifest = json.loads((home / MANIFEST).read_text())
-        objects = {}
-        for name, checksum in manifest["objects"].items():
-            objects[name] = (home / f"{name}.o").read_bytes()
-            if hashlib.sha256(objects[name]).hexdigest() != checksum:
-                return None
+        with place.inside(digest) as home:
+            manifest = json.loads(home.read(MANIFEST))
+            objects = {}
+            for name, checksum in manifest["objects"].items():
+                objects[name] = home.read(f"{name}.o")
+                if hashlib.sha256(objects[name]).hexdigest() != checksum:
+                    return None
         symbols = {name: (symbol, tuple(kinds)) for name, (symbol, kinds) in manifest["symbols"].items()}
-        if manifest["seal"] != _seal(manifest):
+        if manifest["seal"] != _seal(manifest, digest):
             return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
     return dict(load_objects(objects, symbols))
 
 
-def _seal(manifest: dict[str, Any]) -> str:
-    """Checksum of the manifest itself: its symbols and kinds decide how the code is called."""
-    body = json.dumps([manifest["objects"], manifest["symbols"]], sort_keys=True)
+def _seal(manifest: dict[str, Any], digest: str) -> str:
+    """Checksum of the manifest itself, and of whose it is: its symbols and kinds decide how the code is called."""
+    body = json.dumps([digest, manifest["objects"], manifest["symbols"]], sort_keys=True)
     return hashlib.sha256(body.encode()).hexdigest()
 
 
-def _build(spec: KernelSpec, home: Path) -> dict[str, Any]:
-    """Compile in a folder of our own, then move it into place: two processes may do so at once."""
+def _build(spec: KernelSpec, place: Folder | None, digest: str) -> dict[str, Any]:
+    """Compile, and keep what came of it where that can be done."""
     source = spec.source("compiled")
-    _sweep(home.parent)
-    work = Path(tempfile.mkdtemp(prefix=".building-", dir=home.parent))
-    try:
-        (work / "kernels.py").write_text(source)
-        objects, symbols = compile_entries(work / "kernels.py", entry_names(source))
-        for name, code in objects.items():
-            (work / f"{name}.o").write_bytes(code)
-        manifest: dict[str, Any] = {
-            "objects": {n: hashlib.sha256(c).hexdigest() for n, c in objects.items()},
-            "symbols": symbols,
-        }
-        (work / MANIFEST).write_text(json.dumps(manifest | {"seal": _seal(json.loads(json.dumps(manifest)))}))
-        _move(work, home)
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix="piazzi-") as folder:
+        path = Path(folder) / "kernels.py"
+        path.write_text(source)
+        objects, symbols = compile_entries(path, entry_names(source))
+    if place is not None and may_be_kept():
+        _keep(place, digest, source, objects, symbols)
     return dict(load_objects(objects, symbols))
 
 
-def _sweep(place: Path) -> None:
+def _keep(place: Folder, digest: str, source: str, objects: dict[str, bytes], symbols: dict[str, Any]) -> None:
+    """Write into a folder of our own and move that into place: two processes may do so at once."""
+    with contextlib.suppress(OSError):
+        _sweep(place)
+    work = f".building-{os.urandom(4).hex()}"
+    try:
+        place.make(work)
+        with place.inside(work) as home:
+            home.write("kernels.py", source.encode())
+            for name, code in objects.items():
+                home.write(f"{name}.o", code)
+            manifest: dict[str, Any] = {
+                "objects": {n: hashlib.sha256(c).hexdigest() for n, c in objects.items()},
+                "symbols": symbols,
+            }
+            seal = _seal(json.loads(json.dumps(manifest)), digest)
+            home.write(MANIFEST, json.dumps(manifest | {"seal": seal}).encode())
+        _move(place, work, digest)
+    finally:
+        place.remove(work)
+
+
+def _sweep(place: Folder) -> None:
     """Remove what builds that were killed left behind: nothing takes an hour to compile."""
-    for leftover in [*place.glob(".building-*"), *place.glob(".damaged-*")]:
-        with contextlib.suppress(OSError):
-            if time.time() - leftover.stat().st_mtime > 3600:
-                shutil.rmtree(leftover, ignore_errors=True)
+    for name, written in place.ages().items():
+        if name.startswith((".building-", ".damaged-")) and time.time() - written > 3600:
+            place.remove(name)
 
 
-def _move(work: Path, home: Path) -> None:
+def _move(place: Folder, work: str, digest: str) -> None:
     """Put a finished folder in its place; one that is damaged makes way, one that another process finished stays."""
     for _ in range(3):
         try:
-            os.rename(work, home)
+            place.rename(work, digest)
             return
         except OSError:
-            if _read(home) is not None:
+            if _read(place, digest) is not None:
                 return
-            aside = Path(tempfile.mkdtemp(prefix=".damaged-", dir=home.parent))
+            aside = f".damaged-{os.urandom(4).hex()}"
             with contextlib.suppress(OSError):
-                os.rename(home, aside / "old")
-            shutil.rmtree(aside, ignore_errors=True)
+                place.rename(digest, aside)
+            place.remove(aside)

@@ -135,14 +135,29 @@ def _prepare() -> None:
             llvm.add_symbol(name, anywhere)
 
 
+def machine_options() -> dict[str, Any]:
+    """Options of the machine that code is loaded for: those that Numba compiles it with.
+
+    On x86 both sides have the same by default; elsewhere, code model and relocations decide how far the code may lie from what
+    it calls.
+    """
+    import llvmlite.binding as llvm
+
+    family = llvm.Target.from_default_triple().name
+    reloc = "static" if family.startswith("x86") else "pic" if family.startswith("ppc") else "default"
+    cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    return {"cpu": cpu, "features": features, "opt": 3, "reloc": reloc, "codemodel": "jitdefault", "jit": True}
+
+
 def load_objects(objects: Mapping[str, bytes], symbols: Mapping[str, tuple[str, tuple[str, ...]]]) -> dict[str, Entry]:
     """Entries by name from object files and, for each, its symbol and the kinds of its arguments."""
     import llvmlite.binding as llvm
 
     _prepare()
-    entries = {}
+    entries, options = {}, machine_options()
     for name, code in objects.items():
-        machine = llvm.Target.from_default_triple().create_target_machine()  # the engine's own: it is freed with it
+        target = llvm.Target.from_triple(llvm.get_process_triple())
+        machine = target.create_target_machine(**options)  # the engine's own: it is freed with it
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-_SAME = ("python", "piazzi", "numpy", "llvmlite", "numba")
+from piazzi.kernels.spec import machine_lanes
+
+_SAME = ("python", "piazzi", "numpy", "llvmlite", "numba", "lanes")
 
 
 def difference_of(there: dict[str, str], here: dict[str, str]) -> str:
@@ -30,5 +32,5 @@ def _fingerprint() -> tuple[tuple[str, str], ...]:
 
 
 def fingerprint() -> dict[str, str]:
-    """Versions of everything that the bits of a result depend on, the text of Piazzi itself included."""
-    return dict(_fingerprint())
+    """Versions of everything that the bits of a result depend on: the text of Piazzi itself, and the lanes that it works in."""
+    return {**dict(_fingerprint()), "lanes": str(machine_lanes())}
