@@ -202,3 +202,84 @@ def test_a_discrete_model_cannot_be_interrupted():
     model = pz.Model(["x"], ["x"], [pz.Sensor("s", ["x"])], discrete=True)
     with pytest.raises(ValueError, match="manoeuvres need a continuous model"):
         pz.Problem(model, pz.Gaussian([0.0], [1.0]), manoeuvres=[pz.Manoeuvre(1.0, [1.0], states=["x"])])
+
+
+# ---- within rounding of an epoch -------------------------------------------------------------------------------------
+
+GRIDS = {
+    "from zero": 0.1 * np.arange(6),
+    "before zero": -0.3 + 0.1 * np.arange(6),
+    "across a zero that is none": -333.3 + 111.1 * np.arange(6),
+    "far before zero": -1e6 + 15.0 * np.arange(6),
+    "far after zero": 1e9 + 15.0 * np.arange(6),
+    "uneven": np.cumsum([0.1, 0.2, 1e3, 1e-3, 0.7, 1e5]),
+}
+
+
+def happened(problem, times) -> list[np.ndarray]:
+    """How often the velocity has jumped at each epoch: in simulation, filters, smoother, graph, live, and by one forecast."""
+    tracking = pz.Tracking(times, np.zeros(len(times)))
+    ekf = pz.ExtendedKalmanFilter()
+    whole = [e.estimate(problem, tracking) for e in (ekf, pz.SquareRootKalmanFilter(), pz.Smoother(), pz.FactorGraph())]
+    live, window = ekf.start(problem), pz.SlidingWindow(len(times)).start(problem)
+    means = []
+    for t in times:
+        for session in (live, window):
+            session.update("a", 0.0, t)
+        means.append([live.mean[1], window.mean[1]])
+    first = ekf.estimate(problem, pz.Tracking(times[:1], [0.0]))
+    ahead = np.append(0.0, first.predict(times[1:]).mean[:, 1])
+    return [
+        pz.simulate(problem, times, np.random.default_rng(0)).truth[:, 1],
+        *(e.mean[:, 1] for e in whole),
+        *np.array(means).T,
+        ahead,
+    ]
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_within_rounding_of_an_epoch_it_happens_once_and_at_that_epoch(grid):
+    """At it, one and two units in the last place beside it, and just within what counts as the same time."""
+    times = GRIDS[grid]
+    model = pz.Model(["x", "v"], ["v", "0"], [pz.Sensor("s", ["x"])], groups={"velocity": ["v"]})
+    for k in range(1, len(times)):
+        at = [times[k]]
+        for direction in (-np.inf, np.inf):
+            one = np.nextafter(times[k], direction)
+            at += [one, np.nextafter(one, direction)]
+        slack = 1e-12 * max(abs(times[k]), 1.0)
+        at += [times[k] - 0.9 * slack, times[k] + 0.9 * slack]
+        for when in at:
+            problem = pz.Problem(
+                model, pz.Gaussian([0, 0], np.zeros((2, 2))), None, [pz.Station("a", "s", 1.0)],
+                integrator=pz.RungeKutta4(3), manoeuvres=[pz.Manoeuvre(when, [1.0])],
+            )  # fmt: skip
+            for jumps in happened(problem, times):
+                assert_allclose(jumps, np.arange(len(times)) >= k, rtol=0, atol=0, err_msg=f"{when!r} at {times[k]!r}")
+
+
+@pytest.mark.parametrize("factor", [1.1, 3.0, 30.0])
+@pytest.mark.parametrize("grid", GRIDS)
+def test_a_little_after_an_epoch_it_happens_once_in_the_next_interval(grid, factor):
+    times = GRIDS[grid]
+    model = pz.Model(["x", "v"], ["v", "0"], [pz.Sensor("s", ["x"])], groups={"velocity": ["v"]})
+    for k in range(1, len(times) - 1):
+        when = times[k] + factor * 1e-12 * max(abs(times[k]), 1.0)
+        problem = pz.Problem(
+            model, pz.Gaussian([0, 0], np.zeros((2, 2))), None, [pz.Station("a", "s", 1.0)],
+            integrator=pz.RungeKutta4(3), manoeuvres=[pz.Manoeuvre(when, [1.0])],
+        )  # fmt: skip
+        for jumps in happened(problem, times):
+            assert_allclose(jumps, np.arange(len(times)) >= k + 1, rtol=0, atol=0, err_msg=f"{when!r} after {times[k]!r}")
+
+
+@pytest.mark.parametrize("start", [0.0, -333.3, 1e6])
+def test_within_rounding_of_the_prior_it_is_refused_by_whole_runs_and_live(start):
+    for when in (start, np.nextafter(start, np.inf), start + 0.9e-12 * max(abs(start), 1.0), start - 1.0):
+        for prior_time in (None, start):
+            problem = orbits.orbit(2, kernels.Kepler(), manoeuvres=[burn(when)], prior_time=prior_time)
+            with pytest.raises(ValueError, match="is not after the prior"):
+                pz.ExtendedKalmanFilter().estimate(problem, pz.Tracking([start, start + 9.0], [7e6, 7e6]))
+            for estimator in (pz.ExtendedKalmanFilter(), pz.UnscentedKalmanFilter(), pz.SlidingWindow(3)):
+                with pytest.raises(ValueError, match="is not after the prior"):
+                    estimator.start(problem).update("centre", 7e6, start)

@@ -12,6 +12,7 @@ from piazzi import kernels
 from piazzi.estimate.saved import Saved
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, check_span
+from piazzi.problem.inputs import unresolved
 from piazzi.problem.manoeuvres import check_after
 
 
@@ -26,6 +27,8 @@ class Clock:
             )
         self.problem = problem
         self.time = problem.prior_time
+        if self.time is not None:
+            check_after(problem.manoeuvres, self.time)
         self._steps: dict[float, tuple[int, float]] = {}
 
     def interval(self, t: float, since: float | None = None) -> float:
@@ -61,7 +64,7 @@ def checked_measurement(problem: Problem, stations: Mapping[str, int], station: 
     Raises
     ------
     ValueError
-        For an unknown station, a wrong number of components, or an infinite value.
+        For an unknown station, a wrong number of components, or a value that is infinite or rounded by more than its noise.
     """
     s = stations.get(station)
     s = problem.station_index(station) if s is None else s
@@ -71,9 +74,12 @@ def checked_measurement(problem: Problem, stations: Mapping[str, int], station: 
             f"station {station!r} measured {z!r}; it must be {len(problem.stations[s].noise)} numbers, NaN where missing"
         )
     row.fill(np.nan)
+    limits = problem.station_limits[s]
     for i, value in enumerate(values):
         if value in (np.inf, -np.inf):
             raise ValueError(f"station {station!r} measured {z!r}; write NaN for a missing value")
+        if abs(value) > limits[i]:
+            raise ValueError(unresolved(problem, s, i, float(value)))
         row[i] = value
     return s
 

@@ -35,7 +35,7 @@ class Shot:
 
 def along(problem: Problem, inputs: Inputs, states: Array) -> Shot:
     """Linearised about given states (K, n)."""
-    return _observe(problem, inputs, np.array(states, dtype=float), follow=False)
+    return _observe(problem, inputs, np.array(states, dtype=float, order="C"), follow=False)
 
 
 def from_first(problem: Problem, inputs: Inputs, first: Array) -> Shot:

@@ -13,8 +13,8 @@ Array = np.ndarray[Any, Any]
 
 
 def frozen(a: Any) -> Array:
-    """A read-only copy as float64."""
-    out = np.array(a, dtype=float)
+    """A read-only copy as float64, row by row: kernels take no other order."""
+    out = np.array(a, dtype=float, order="C")
     out.setflags(write=False)
     return out
 
@@ -33,13 +33,13 @@ def lock(value: Any) -> None:
 
 
 def numeric(value: Any, what: str) -> Array:
-    """The value as a float64 array; raises ValueError where it is not made of real numbers."""
+    """A copy of the value as a float64 array, row by row; raises ValueError where it is not made of real numbers."""
     try:
         out = np.asarray(value)
         if out.dtype.kind not in "biuf":
             raise TypeError(f"it has type {out.dtype}")
         with np.errstate(over="ignore", invalid="ignore"):  # of longer doubles, and of signalling NaN
-            return np.array(out, dtype=float)
+            return np.array(out, dtype=float, order="C")
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what} is not made of real numbers: {error}") from None
 

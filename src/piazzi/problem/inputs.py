@@ -84,10 +84,32 @@ def prepare(problem: Problem, tracking: Tracking) -> Inputs:
         station = tracking.stations_of(problem)
         start, count, scale = problem.intervals(tracking.times)
         z = tracking.padded(problem.model.width)
+        _check_resolved(problem, tracking, station, z)
         inputs = Inputs(tracking.times, start, count, scale, tracking.first_row, z, station)
         inputs.run_of(problem)
         kept = tracking.__dict__["_prepared"] = problem, inputs
     return kept[1]
+
+
+def _check_resolved(problem: Problem, tracking: Tracking, station: Array, z: Array) -> None:
+    """Raise ValueError for a measurement whose rounding, as a number, is larger than its noise."""
+    limits = np.array(problem.station_limits)
+    if not limits.size or np.nanmax(np.abs(z)) <= limits.min():
+        return
+    beyond = np.argwhere(np.abs(z) > limits[station])
+    if beyond.size:
+        row, i = (int(v) for v in beyond[0])
+        where = f"row {row} (t = {tracking.row_times[row]:g} s)"
+        raise ValueError(f"{where}: {unresolved(problem, int(station[row]), i, float(z[row, i]))}")
+
+
+def unresolved(problem: Problem, station: int, component: int, value: float) -> str:
+    """What to say of a measurement that is larger than its station's limit."""
+    eps = float(np.finfo(float).eps)
+    return (
+        f"station {problem.stations[station].name!r} measured {value:g}, which a number holds to {eps * abs(value):.2g}, with noise "
+        f"of sigma {eps * problem.station_limits[station][component]:.2g}: below its rounding nothing is measured; give more noise"
+    )
 
 
 def with_prior_node(inputs: Inputs) -> Inputs:

@@ -11,6 +11,8 @@ from piazzi.problem.checks import Array, covariance, finite_vector, numeric
 from piazzi.problem.parts import Manoeuvre
 from piazzi.text import nearest
 
+SAME = 1e-12
+
 
 def checked(manoeuvres: Manoeuvre | Sequence[Manoeuvre], model: Model) -> tuple[Manoeuvre, ...]:
     """The manoeuvres in order of time, with full covariances and the names of the states that jump; raises ValueError."""
@@ -44,8 +46,11 @@ def _states(given: str | Sequence[str], model: Model, what: str) -> tuple[str, .
 
 
 def check_after(manoeuvres: Sequence[Manoeuvre], start: float) -> None:
-    """Raise ValueError for a manoeuvre that is not after the prior, at `start`: nothing would apply it."""
-    if manoeuvres and manoeuvres[0].time <= start:
+    """Raise ValueError for a manoeuvre that is not after the prior, at `start`: nothing would apply it.
+
+    As in the kernels, times are one that differ by 1e-12 of themselves, or by as many seconds.
+    """
+    if manoeuvres and manoeuvres[0].time - start <= SAME * max(abs(manoeuvres[0].time), 1.0):
         raise ValueError(f"the manoeuvre at {manoeuvres[0].time:g} s is not after the prior at {start:g} s")
 
 

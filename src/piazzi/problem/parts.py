@@ -86,7 +86,8 @@ class Manoeuvre:
     Parameters
     ----------
     time : float
-        Seconds, after the prior.  A manoeuvre at the time of a measurement happened just before it.
+        Seconds, after the prior.  A manoeuvre at the time of a measurement happened just before it; times are the same that
+        differ by no more than 1e-12 of themselves, or a picosecond.
     delta_v : (d,)
         Added to the velocity.
     covariance : (d, d), or its diagonal (d,); semidefinite; default zero

@@ -239,6 +239,12 @@ class Problem:
         return out
 
     @cached_property
+    def station_limits(self) -> tuple[tuple[float, ...], ...]:
+        """For each station and component, the largest measurement that a number holds more exactly than its noise."""
+        sigma = np.sqrt(np.diagonal(self.station_noise, axis1=1, axis2=2))
+        return tuple(tuple(row) for row in (sigma / np.finfo(float).eps).tolist())
+
+    @cached_property
     def station_correlated(self) -> Array:
         """For each station, 1 where its R is not diagonal, (S,)."""
         return _indices(not _is_diagonal(s.noise) for s in self.stations)

@@ -1,7 +1,9 @@
 """From one epoch to the next through manoeuvres: at each, the state jumps.
 
 The manoeuvres follow the parameters in `p`: how many there are, then for each its time, the jump (N) and its covariance (N, N).
-One at the time of an epoch belongs to the interval that ends there.
+One at the time of an epoch belongs to the interval that ends there.  Times that differ by 1e-12 of themselves, or by as many
+seconds, are one: sums of intervals are rounded.  What decides is a property of the manoeuvre alone, so that the intervals on
+both sides of an epoch agree whose it is.
 """
 
 from piazzi.kernels.vocabulary import *  # noqa: F403
@@ -16,7 +18,7 @@ def manoeuvre(i):
 @inline
 def happens(when, t, dt):
     """Whether `when` is in (t, t + dt], whichever way the sum was rounded."""
-    slack = 1e-12 * maximum(fabs(when), fabs(t))
+    slack = 1e-12 * maximum(fabs(when), 1.0)
     return when - t > slack and when - (t + dt) <= slack
 
 
