@@ -30,7 +30,8 @@ if TYPE_CHECKING:
         predict,
         update,
     )
-    from piazzi.estimate.substeps import choose_substeps, step_warning, substep_error
+    from piazzi.estimate.long_steps import step_warning
+    from piazzi.estimate.substeps import choose_substeps, substep_error
     from piazzi.evaluate import Comparison, Observability, WindowTrade, compare, observability, windows
     from piazzi.kernels import (
         Discrete,
@@ -79,7 +80,8 @@ _WHERE = {
     **dict.fromkeys(("Comparison", "Observability", "WindowTrade"), "piazzi.evaluate"),
     **dict.fromkeys(("compare", "observability", "windows"), "piazzi.evaluate"),
     **dict.fromkeys(("Bank", "Cauchy", "Huber", "Tukey"), "piazzi.estimate"),
-    **dict.fromkeys(("choose_substeps", "step_warning", "substep_error"), "piazzi.estimate.substeps"),
+    **dict.fromkeys(("choose_substeps", "substep_error"), "piazzi.estimate.substeps"),
+    "step_warning": "piazzi.estimate.long_steps",
     **dict.fromkeys(("kepler_transition", "propagate_kepler"), "piazzi.orbit"),
     **dict.fromkeys(("Study", "read_store"), "piazzi.study"),
     "simulate": "piazzi.simulation",

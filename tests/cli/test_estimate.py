@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -200,12 +201,17 @@ def test_long_steps_are_warned_of_in_one_line(call, tmp_path):
     fine.write_text(text + '\n[truth.integrator]\nmethod = "rk4"\nsubsteps = 40\n')
     assert call("simulate", fine, "-o", tmp_path / "rows.csv").status == 0
     for arguments in ([fine], [tmp_path / "rows.csv", "--scenario", coarse]):
-        for estimator in ("ekf", "graph", "window:5"):
-            result = call("estimate", *arguments, "--with", estimator, "--json")
-            (line,) = result.said
-            name = arguments[0].name
-            assert line.startswith(f"piazzi: warning: {name}: the integrator's steps are too long: 4 times as many move '")
-            assert result.document["rows"][0]["success"]
+        name = arguments[0].name
+        wanted = rf"piazzi: warning: {re.escape(name)}: the integrator's steps are too long: \d+ times as many move '.*"
+        for estimator in ("ekf", "graph", "window:5", "smoother"):
+            for command in ("estimate", "compare"):
+                result = call(command, *arguments, "--with", estimator, "--json")
+                (line,) = result.said
+                assert re.fullmatch(wanted, line)
+                assert result.document["rows"][0]["success"]
+        page = tmp_path / "page.html"
+        assert re.search(wanted, call("report", *arguments, "--with", "smoother", "-o", page).err)
+        assert "steps are too long" in page.read_text()
     assert call("estimate", coarse, "--json").said == []
 
 

@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi import kernels
-from piazzi.estimate import substeps
-from piazzi.estimate.substeps import choose_substeps, step_warning, substep_error
+from piazzi.estimate import long_steps
+from piazzi.estimate.long_steps import step_warning
+from piazzi.estimate.substeps import choose_substeps, substep_error
 from tests.laws.problems import linear, random_covariance, satellite
 from tests.solvers import orbits
 
@@ -86,9 +87,11 @@ def test_one_long_step_is_warned_of_and_short_ones_are_not():
     tracking = pz.simulate(short, np.arange(1441) * 15.0, np.random.default_rng(1))
     text = step_warning(long, tracking)
     found = re.fullmatch(
-        r"the integrator's steps are too long: 4 times as many move '(\w+)' by (\S+) sigma at t = (\S+) s; .*", text
+        r"the integrator's steps are too long: (\d+) times as many move '(\w+)' by (\S+) sigma at t = (\S+) s; .*", text
     )
-    assert float(found[2]) == pytest.approx(substep_error(long, tracking).worst, rel=0.1)  # the same, to first order
+    seen = (1 - 1 / int(found[1])) / (1 - 1 / 4)  # a method of order 1 leaves a quarter of the error with steps of a quarter
+    assert int(found[1]) > 4
+    assert float(found[3]) == pytest.approx(seen * substep_error(long, tracking).worst, rel=0.1)  # the same, to first order
     assert step_warning(short, tracking) == ""
     assert step_warning(long, tracking, limit=1e3) == ""
     assert "too long" in step_warning(long, tracking, estimator=pz.SlidingWindow(5))
@@ -99,24 +102,82 @@ def test_one_long_step_is_warned_of_and_short_ones_are_not():
 
 
 @pytest.mark.usefixtures("uncompiled")
-def test_a_filter_that_is_lost_with_any_steps_says_nothing_about_them():
-    """Measurements of something else altogether: no warning about steps, however long they are."""
+def test_a_filter_that_is_lost_with_any_steps_is_told_of():
+    """Measurements of something else altogether: no word about steps, whose sigma would say nothing."""
     rng = np.random.default_rng(0)
     tracking = pz.Tracking(np.arange(50) * 0.5, 100 * rng.standard_normal(50))
-    assert step_warning(oscillator(1), tracking) == ""
+    said = step_warning(oscillator(10), tracking)
+    assert re.fullmatch(
+        r"the estimate is lost, with steps of any length: half of its innovations are beyond (\S+) sigma; .*", said
+    )
     own = pz.simulate(replace(oscillator(1), truth=None, integrator=pz.RungeKutta4(10)), tracking.times, rng)
     assert "too long" in step_warning(replace(oscillator(1), integrator=pz.Euler(1)), own)
+    assert step_warning(oscillator(10), own) == ""
+    elsewhere = pz.Tracking(own.times, own.values, truth=own.truth + 1e3)
+    assert "half of its errors are beyond" in step_warning(oscillator(10), elsewhere)
+
+
+def far_apart(integrator=None) -> tuple[pz.Problem, pz.Tracking]:
+    """A low satellite by its distance from the centre, once in six hours: four turns between two measurements."""
+    noise = pz.ProcessNoise([0.0, 0.0, 1e-8, 1e-8])
+    x = np.array([7e6, 0.0, 0.0, 7.8e3])
+    problem = orbits.orbit(
+        2, integrator, prior=pz.Gaussian(x, [1e4, 1e4, 1e-2, 1e-2]), process_noise=noise,
+        stations=[pz.Station("centre", "range", 1.0)],
+    )  # fmt: skip
+    times = 21600.0 * np.arange(6)
+    exact = [np.linalg.norm(pz.propagate_kepler(x[:2], x[2:], orbits.MU, t)[0]) for t in times]
+    return problem, pz.Tracking(times, exact)
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_the_worst_steps_are_not_passed_over():
+    """The default's ten substeps between measurements six hours apart: as wrong as can be, and as sure of itself as ever."""
+    problem, tracking = far_apart()
+    estimate = pz.ExtendedKalmanFilter().estimate(problem, tracking)
+    exact = pz.propagate_kepler(problem.mean[:2], problem.mean[2:], orbits.MU, tracking.times[-1])[0]
+    assert estimate.success
+    assert np.linalg.norm(estimate.mean[-1, :2] - exact) > 1e7  # a turn of the orbit is 1.4e7 m across
+    found = re.fullmatch(
+        r"the integrator's steps are too long: (\d+) times as many move '\w+' by (\S+) sigma at t = \S+ s; .*",
+        step_warning(problem, tracking),
+    )
+    assert int(found[1]) >= 64
+    assert float(found[2]) > 1e4
+    enough = replace(problem, integrator=pz.RungeKutta4(10 * int(found[1])))
+    assert step_warning(enough, tracking) == ""
+    found = pz.ExtendedKalmanFilter().estimate(enough, tracking)
+    assert np.linalg.norm(found.mean[-1, :2] - exact) < 100.0
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_steps_that_never_agree_are_told_of(monkeypatch):
+    monkeypatch.setattr(long_steps, "FINEST", 64)
+    said = step_warning(*far_apart(pz.Euler(10)))
+    assert said.startswith("the integrator's steps are far too long: even 16 and 64 times as many differ by ")
+    assert "DormandPrince" in said
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_an_estimate_that_only_finer_steps_make_finite():
+    """x' = -x^3 in steps of a second: from 3 each jumps further out, and overflows."""
+    model = pz.Model(["x"], ["-x**3"], [pz.Sensor("s", ["x"])])
+    problem = pz.Problem(model, pz.Gaussian(3.0, 1e-2), None, [pz.Station("a", "s", 1.0)], integrator=pz.RungeKutta4(10))
+    tracking = pz.Tracking(10.0 * np.arange(3), [3.0, 0.2, 0.15])
+    assert not pz.ExtendedKalmanFilter().estimate(problem, tracking).success
+    said = step_warning(problem, tracking)
+    assert re.search(r"too long: the estimate is not finite, and is with \d+ times as many", said)
 
 
 @pytest.mark.usefixtures("uncompiled")
 def test_of_a_long_recording_the_beginning_is_looked_at(monkeypatch):
-    monkeypatch.setattr(substeps, "LOOKED_AT", 20)
+    monkeypatch.setattr(long_steps, "LOOKED_AT", 20)
     problem = replace(oscillator(1), integrator=pz.Euler(1), truth=None)
     times = np.concatenate([np.arange(20) * 1e-4, 1.0 + np.arange(20)])
     rows = np.repeat(times, 2)
     short, long = (pz.Tracking(rows[:n], np.cos(rows[:n]), np.full(n, "a")) for n in (40, 80))
     assert step_warning(problem, short) == step_warning(problem, long) == ""
-    monkeypatch.setattr(substeps, "LOOKED_AT", 40)
+    monkeypatch.setattr(long_steps, "LOOKED_AT", 40)
     assert "too long" in step_warning(problem, long)
 
 

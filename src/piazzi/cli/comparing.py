@@ -44,12 +44,12 @@ def run_comparison(
 def _warning_of_steps(found: Source, comparison: Comparison, estimators: Mapping[str, Estimator]) -> str:
     """What to say where the steps are long beside the noise, unless the truth was simulated with the same steps.
 
-    Judged by an estimator whose kernel this run has compiled anyway: the filter, where it or a graph (which starts from it)
-    is asked for, else the first that gives states in real time.
+    Judged by an estimator whose kernel this run has compiled anyway, where there is one: the filter, where it or a graph (which
+    starts from it) is asked for, else the first that gives states in real time, else the filter.
     """
     from piazzi.estimate import ExtendedKalmanFilter, FactorGraph
+    from piazzi.estimate.long_steps import step_warning
     from piazzi.estimate.registry import views_of
-    from piazzi.estimate.substeps import step_warning
 
     truth = found.problem.truth
     if not found.recorded and (truth is None or truth.integrator is None):
@@ -57,8 +57,6 @@ def _warning_of_steps(found: Source, comparison: Comparison, estimators: Mapping
     used = [estimators[name] for name, estimate in comparison.estimates.items() if estimate.success]
     plain = ExtendedKalmanFilter()
     if not any(e == plain or isinstance(e, FactorGraph) for e in used):
-        used = [e for e in used if "realtime" in views_of(e)]
-        if not used:
-            return ""
-        plain = used[0]  # type: ignore[assignment]
+        realtime = [e for e in used if "realtime" in views_of(e)]
+        plain = realtime[0] if realtime else plain  # type: ignore[assignment]
     return step_warning(found.problem, found.tracking, estimator=plain)

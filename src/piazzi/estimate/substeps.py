@@ -8,18 +8,14 @@ from typing import Any
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.estimator import Estimate, Estimator
-from piazzi.estimate.kalman import ExtendedKalmanFilter, update_fragments
+from piazzi.estimate.kalman import update_fragments
 from piazzi.problem import Problem, ProcessNoise, Tracking, Truth
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import prepare
 from piazzi.simulation import simulate, true_problem
 
 FINER = 4  # times as many substeps stand for the truth: even at order 1 that leaves a quarter of the error unseen
-SMALL = 0.1  # of a standard deviation: adds half a per cent to the mean squared error
 MOST = 2**20
-LOOKED_AT = 20_000  # epochs: some 40 ms of a filter
-LOST = 3.0  # mean squared innovation, in variances, of a filter that has lost its track
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,64 +104,6 @@ def _undisturbed(problem: Problem, times: Any) -> Tracking:
     exact = [replace(m, covariance=None) for m in problem.manoeuvres]
     truth = Truth(problem.mean[: len(problem.model.states)], fixed, calm, measurement_noise=False, manoeuvres=exact)
     return simulate(replace(problem, truth=truth), times, np.random.default_rng(0))
-
-
-def step_warning(problem: Problem, tracking: Tracking, limit: float = SMALL, estimator: Estimator | None = None) -> str:
-    """A sentence where finer steps move an estimate by more than `limit` standard deviations, "" where they do not.
-
-    The estimator runs twice, the second time with four times as many substeps; no other kernel is needed, so a warm call costs
-    what the second run does.  Of a long recording only the first 20,000 epochs are looked at.
-
-    Parameters
-    ----------
-    problem : Problem
-    tracking : Tracking
-    limit : float
-    estimator : an estimator that gives every epoch's state in real time; default the extended Kalman filter
-    """
-    assert problem.integrator is not None
-    if problem.integrator.chooses_steps:
-        return ""
-    seen, runner = _beginning(tracking, LOOKED_AT), estimator or ExtendedKalmanFilter()
-    coarse = runner.estimate(problem, seen)
-    fine = runner.estimate(_finer(problem), seen)
-    if not (coarse.success and fine.success) or _misfit(fine) > max(LOST, 0.5 * _misfit(coarse)):
-        return ""  # lost with steps of any length, so that its sigma says nothing
-    sigma = np.sqrt(np.diagonal(fine.covariance, axis1=1, axis2=2))
-    moved = StepError(seen.times, coarse.mean - fine.mean, sigma, problem.model.names)
-    if not moved.worst > limit:
-        return ""
-    state, time = moved.where
-    return (
-        f"the integrator's steps are too long: {FINER} times as many move {state!r} by {moved.worst:.2g} sigma at "
-        f"t = {time:g} s; give it more substeps, or a method of higher order"
-    )
-
-
-def _finer(problem: Problem) -> Problem:
-    """The problem with more substeps in every interval."""
-    integrator = problem.integrator
-    assert integrator is not None
-    if integrator.max_step is not None:
-        return replace(problem, integrator=replace(integrator, max_step=integrator.max_step / FINER))
-    assert integrator.substeps is not None
-    return replace(problem, integrator=replace(integrator, substeps=FINER * integrator.substeps))
-
-
-def _misfit(estimate: Estimate) -> float:
-    """Mean squared innovation in units of its variance: 1 where the filter knows its errors."""
-    variance = np.diagonal(estimate.innovation_covariances, axis1=1, axis2=2)
-    there = ~np.isnan(estimate.innovations)
-    return float(np.mean(estimate.innovations[there] ** 2 / variance[there])) if there.any() else 0.0
-
-
-def _beginning(tracking: Tracking, epochs: int) -> Tracking:
-    """The rows of the first so many epochs."""
-    if len(tracking.times) <= epochs:
-        return tracking
-    rows = slice(int(tracking.first_row[epochs]))
-    names = None if tracking.row_stations is None else tracking.row_stations[rows]
-    return Tracking(tracking.row_times[rows], tracking.values[rows], names, None, tracking.epoch)
 
 
 def choose_substeps(problem: Problem, times: Any, tolerance: float = 0.01) -> Problem:

@@ -106,9 +106,10 @@ def _check_resolved(problem: Problem, tracking: Tracking, station: Array, z: Arr
 def unresolved(problem: Problem, station: int, component: int, value: float) -> str:
     """What to say of a measurement that is larger than its station's limit."""
     eps = float(np.finfo(float).eps)
+    name, sigma = problem.stations[station].name, eps * problem.station_limits[station][component]
     return (
-        f"station {problem.stations[station].name!r} measured {value:g}, which a number holds to {eps * abs(value):.2g}, with noise "
-        f"of sigma {eps * problem.station_limits[station][component]:.2g}: below its rounding nothing is measured; give more noise"
+        f"station {name!r} measured {value:g}, which a number holds to {eps * abs(value):.2g}, with noise of sigma "
+        f"{sigma:.2g}; nothing is measured below rounding: give more noise"
     )
 
 
