@@ -18,7 +18,7 @@ import tempfile
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -177,7 +177,7 @@ def main() -> int:
         tallies = every(options)
     else:
         tallies = [run(options.format, options.minutes, options.inputs, options.seed, options.keep)]
-    print(json.dumps(asdict(tallies[0])) if options.as_json else table(tallies))
+    print(json.dumps(vars(tallies[0])) if options.as_json else table(tallies))
     return 1 if any(tally.bad for tally in tallies) else 0
 
 
