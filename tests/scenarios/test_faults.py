@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from piazzi.expressions import patience
 from piazzi.scenarios import ScenarioError, check, load_scenario, show
 from piazzi.scenarios.faults import Faults
 from piazzi.scenarios.loader import MAX_BYTES
@@ -266,3 +267,17 @@ def test_no_change_to_a_file_brings_down_its_reader(data):
     scenario = read_scenario(tables, "changed", faults)
     assert (scenario is None) == bool(faults)
     assert all(str(f).isprintable() for f in faults)
+
+
+def test_equations_that_keep_sympy_busy_are_found(tmp_path, monkeypatch):
+    """They are right as text; `check` said that nothing was wrong, and the first estimate never came."""
+    slow = "1"
+    for _ in range(26):
+        slow = f"({slow}+pi)**(1/3)"
+    text, path = show("b612-range"), tmp_path / "slow.toml"
+    assert "sqrt((x - mx)**2" in text
+    path.write_text(text.replace("sqrt((x - mx)**2", f"{slow} + sqrt((x - mx)**2"))
+    monkeypatch.setattr(patience, "SECONDS", 0.3)
+    (fault,) = check(path)
+    assert fault.path == "sensors.range"
+    assert "SymPy needs more than 0.3 s for this" in fault.message

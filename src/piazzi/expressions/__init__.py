@@ -16,6 +16,7 @@ from piazzi.expressions.functions import arities
 from piazzi.expressions.language import CONSTANTS
 from piazzi.expressions.numeric import evaluate, evaluate_arrays
 from piazzi.expressions.parse import Equation, is_name
+from piazzi.expressions.patience import TooSlowError, patiently
 from piazzi.expressions.symbolic import build, symbol
 from piazzi.expressions.writing import write
 from piazzi.text import suggest
@@ -73,9 +74,13 @@ def to_sympy(text: str, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
     Raises
     ------
     ExpressionError
-        As `check` does, and where SymPy finds that a part has no finite real value.
+        As `check` does, where SymPy finds that a part has no finite real value, and where that takes it more than 5 s.
     """
-    return build(_read_with(text, symbols), symbols)
+    parsed = _read_with(text, symbols)
+    try:
+        return patiently(lambda: build(parsed, symbols))
+    except TooSlowError as error:
+        raise ExpressionError(f"{error}: write it in a simpler way", text) from None
 
 
 def from_sympy(expr: object) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 from piazzi.expressions import symbol, to_sympy
+from piazzi.expressions.patience import TooSlowError, patiently
 from piazzi.model.definitions import Definitions, needed
 from piazzi.model.model import STEP, TIME, Model
 from piazzi.model.sensor import Sensor
@@ -135,6 +136,11 @@ def jacobian(f: sp.Matrix, x: Sequence[sp.Symbol]) -> sp.Matrix:
     """df/dx where every value is real: the derivative of ``abs`` is ``sign``, and that of ``sign`` zero.
 
     SymPy's own derivative of ``abs(log(x))`` allows for a complex logarithm, which has no compiled form.
+
+    Raises
+    ------
+    ValueError
+        Where SymPy takes more than 5 s for the derivatives of one equation.
     """
     import sympy as sp
 
@@ -146,8 +152,17 @@ def jacobian(f: sp.Matrix, x: Sequence[sp.Symbol]) -> sp.Matrix:
         def fdiff(self, argindex: int = 1) -> Any:
             return Sign(self.args[0])
 
-    real = f.replace(sp.Abs, Magnitude).replace(sp.sign, Sign)
-    return real.jacobian(list(x)).replace(Magnitude, sp.Abs).replace(Sign, sp.sign)
+    def row(i: int) -> sp.Matrix:
+        real = f[i, :].replace(sp.Abs, Magnitude).replace(sp.sign, Sign)
+        return real.jacobian(list(x)).replace(Magnitude, sp.Abs).replace(Sign, sp.sign)
+
+    entries: list[sp.Expr] = []
+    for i in range(f.rows):
+        try:
+            entries += patiently(partial(row, i))
+        except TooSlowError as error:
+            raise ValueError(f"derivatives of equation {i + 1}: {error}") from None
+    return sp.Matrix(f.rows, len(x), entries)
 
 
 def constant_acceleration_step(model: Model) -> tuple[tuple[sp.Expr, ...], sp.Symbol]:

@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from piazzi.model import Model
 from piazzi.scenarios.faults import Fault, Faults, ScenarioError, shown
 from piazzi.scenarios.read import read_scenario
 from piazzi.scenarios.scenario import Scenario
@@ -68,7 +69,21 @@ def check(source: str | os.PathLike[str]) -> list[Fault]:
         For an unknown name.
     """
     text = os.fspath(source)
-    return _read(FILES / f"{text}.toml" if text in (*names(), TEMPLATE) else Path(text))[1]
+    scenario, faults = _read(FILES / f"{text}.toml" if text in (*names(), TEMPLATE) else Path(text))
+    return faults if scenario is None or faults else _underivable(scenario.problem.model)
+
+
+def _underivable(model: Model) -> list[Fault]:
+    """What SymPy makes nothing of, or not in time, among equations that are right by themselves."""
+    from piazzi.model.derivation import derive, derive_sensor
+
+    faults = Faults()
+    with faults.at("dynamics"):
+        derive(model)
+    for sensor in model.sensors:
+        with faults.at(f"sensors.{sensor.name}"):
+            derive_sensor(model, sensor)
+    return list(faults)
 
 
 @cache

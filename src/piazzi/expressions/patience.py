@@ -1,0 +1,83 @@
+"""A limit on the time that SymPy takes for one equation: some of a hundred characters keep it busy for hours.
+
+It is all Python, so it can be interrupted from another thread, as Ctrl-C interrupts it in the main one.  A child process could
+be stopped as well, but would have to start and import SymPy first, for every model.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+T = TypeVar("T")
+SECONDS = 5.0  # of a processor, where the system can tell, for one equation
+_AGAIN = 0.2  # seconds after which the interruption is repeated: SymPy catches some
+
+
+class TooSlowError(ValueError):
+    """Something took longer than it may."""
+
+
+def patiently(call: Callable[[], T], seconds: float | None = None) -> T:
+    """What a call returns; raises TooSlowError where it takes more than `seconds` (default: `SECONDS`)."""
+    watch = _Watch(SECONDS if seconds is None else seconds)
+    try:
+        try:
+            return call()
+        finally:
+            watch.stop()
+    except watch.interruption:
+        while True:
+            try:
+                watch.stop()
+                break
+            except watch.interruption:  # one that was on its way already
+                continue
+        raise TooSlowError(f"SymPy needs more than {watch.seconds:g} s for this") from None
+
+
+class _Watch:
+    """A thread that interrupts the one that made it, until it is stopped."""
+
+    def __init__(self, seconds: float) -> None:
+        # no Exception, because SymPy catches those; one of its own, so that of nested limits each ends its own block
+        self.interruption: type[BaseException] = type("Interruption", (BaseException,), {})
+        self.seconds = seconds
+        self._thread, self._used = threading.get_ident(), _clock()
+        self._lock, self._stopped = threading.Lock(), threading.Event()
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def stop(self) -> None:
+        """End; nothing is interrupted any more when this has returned."""
+        with self._lock:
+            self._stopped.set()
+        _interrupt(self._thread, None)
+
+    def _run(self) -> None:
+        start, wait = self._used(), self.seconds
+        while not self._stopped.wait(wait):
+            wait = max(start + self.seconds - self._used(), 0.0) or _AGAIN
+            if wait == _AGAIN:
+                with self._lock:
+                    if not self._stopped.is_set():
+                        _interrupt(self._thread, self.interruption)
+
+
+def _clock() -> Callable[[], float]:
+    """Seconds of a processor that this thread has used, to be asked by any thread; else, of the clock on the wall."""
+    try:
+        number = time.pthread_getcpuclockid(threading.get_ident())
+    except (AttributeError, OSError):
+        return time.monotonic
+    return lambda: time.clock_gettime(number)
+
+
+def _interrupt(thread: int, kind: type[BaseException] | None) -> None:
+    """Raise in another thread, or take back what was not raised yet; an interpreter other than CPython cannot."""
+    interface = getattr(ctypes, "pythonapi", None)
+    if interface is not None:
+        argument = ctypes.py_object() if kind is None else ctypes.py_object(kind)
+        interface.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), argument)

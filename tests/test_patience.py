@@ -1,0 +1,140 @@
+"""Equations that keep SymPy busy are refused after a stated time, in any thread, and nothing else is touched."""
+
+import random
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+import sympy as sp
+
+from piazzi.expressions import ExpressionError, patience, symbol, to_sympy
+from piazzi.expressions.patience import TooSlowError, patiently
+from piazzi.model.derivation import jacobian
+from tests.waiting import HANGS
+
+SLOW = "1"
+for _ in range(26):  # 14 levels take 3 s, 18 take 34 s
+    SLOW = f"({SLOW}+pi)**(1/3)"
+
+
+def spin():
+    while True:
+        pass
+
+
+def swallow():
+    while True:
+        try:
+            spin()
+        except BaseException:
+            if random.random() < 0.3:
+                raise
+
+
+def test_a_slow_equation_is_refused(monkeypatch):
+    monkeypatch.setattr(patience, "SECONDS", 0.3)
+    with pytest.raises(ExpressionError, match=r"SymPy needs more than 0.3 s for this: write it in a simpler way"):
+        to_sympy(SLOW, {})
+    assert to_sympy("x + x", {"x": symbol("x")}) == 2 * symbol("x")
+
+
+def test_so_are_slow_derivatives(monkeypatch):
+    monkeypatch.setattr(patience, "SECONDS", 0.2)
+
+    class Slow(sp.Function):
+        def fdiff(self, argindex=1):
+            spin()
+
+    x = symbol("x")
+    with pytest.raises(ValueError, match=r"derivatives of equation 2: SymPy needs more than 0.2 s"):
+        jacobian(sp.Matrix([x**2, Slow(x)]), [x])
+    assert jacobian(sp.Matrix([x**2, sp.Abs(x) * symbol("y")]), [x, symbol("y")]) == sp.Matrix(
+        [[2 * x, 0], [sp.sign(x) * symbol("y"), sp.Abs(x)]]
+    )
+
+
+@pytest.mark.parametrize("call", [spin, swallow])
+def test_in_threads_each_has_its_own_limit(call):
+    """Some end, some are interrupted, none disturbs another."""
+
+    def run(i):
+        try:
+            return patiently(call if i % 2 else lambda: sum(range(1000)), 0.05)
+        except TooSlowError:
+            return "slow"
+
+    with ThreadPoolExecutor(8) as threads:
+        assert list(threads.map(run, range(32))) == [499500, "slow"] * 16
+        assert list(threads.map(lambda i: i, range(100))) == list(range(100))
+
+
+def test_nested_limits_end_their_own_block():
+    def inner():
+        with pytest.raises(TooSlowError):
+            patiently(spin, 0.05)
+        return patiently(spin, 10.0)
+
+    started = time.process_time()
+    with pytest.raises(TooSlowError, match=r"more than 0\.3 s"):
+        patiently(inner, 0.3)
+    assert time.process_time() - started < 5
+
+
+def test_errors_and_results_come_through():
+    with pytest.raises(ZeroDivisionError):
+        patiently(lambda: 1 / 0, 1.0)
+    assert patiently(lambda: 7) == 7
+
+
+def test_an_end_at_the_limit_leaves_nothing_behind():
+    """Whatever the moment: the interruption comes in the call, or never."""
+    outcomes = set()
+    for i in range(300):
+        seconds = 0.002 + 0.00001 * (i % 40)
+        end = time.thread_time() + 0.0022
+
+        def call(end=end):
+            while time.thread_time() < end:
+                pass
+            return "done"
+
+        try:
+            outcomes.add(patiently(call, seconds))
+        except TooSlowError:
+            outcomes.add("slow")
+        for _ in range(100):
+            pass
+    assert outcomes <= {"done", "slow"}
+
+
+def test_watching_threads_end():
+    for _ in range(20):
+        patiently(lambda: None)
+    end = time.monotonic() + HANGS
+    while any("_run" in str(t) for t in threading.enumerate()) and time.monotonic() < end:
+        time.sleep(0.01)
+    assert not any("_run" in str(t) for t in threading.enumerate())
+
+
+@pytest.mark.slow
+def test_a_program_refuses_it_in_ten_seconds(tmp_path):
+    code = f"""
+import resource, time
+import piazzi as pz
+model = pz.Model(["x"], ["-x*{SLOW}"], [pz.Sensor("s", ["x"])])
+problem = pz.Problem(model, pz.Gaussian(1.0, 0.1), 0.01, pz.Station("s", "s", 0.1))
+try:
+    pz.ExtendedKalmanFilter().estimate(problem, pz.Tracking([0.0, 1.0], [1.1, 0.4]))
+except ValueError as error:
+    print(error)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_utime < 10)
+"""
+    environment = {"PIAZZI_CACHE": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=HANGS, check=True
+    )
+    assert "SymPy needs more than 5 s for this" in done.stdout
+    assert done.stdout.endswith("True\n")
