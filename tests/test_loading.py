@@ -84,3 +84,62 @@ print(time.process_time() - started, *[m for m in heavy if m in sys.modules])
     )
     assert heavy == []
     assert float(seconds) < 0.25
+
+
+class TestWhereThePriorStands:
+    """At the start of a scenario's times, whatever the recording; the oracle is the same problem with its prior time given."""
+
+    SPRING = """
+        states = { x = "length", v = "length/time" }
+        dynamics = { x = "v", v = "-0.5*x - 0.1*v" }
+        sensors.ruler.components.position = { equation = "x", unit = "length" }
+        stations = [{ name = "wall", sensor = "ruler", noise = { sigma = 0.1 } }]
+        process_noise = { variance = { v = NOISE } }
+        integrator = { method = "rk8", max_step = 0.1 }
+        times = { start = START, step = 0.5, count = 20 }
+        prior = { PRIOR mean = [1.0, 0.2], sigma = [0.3, 0.3] }
+    """
+
+    def load(self, tmp_path, begins, prior="", start="4.0", noise="1e-7"):
+        text = self.SPRING.replace("START", start).replace("PRIOR", prior).replace("NOISE", noise)
+        (tmp_path / "spring.toml").write_text(text)
+        times = begins + 0.25 * np.arange(12)
+        rows = [f"{float(t)!r},{float(z)!r}" for t, z in zip(times, np.cos(times), strict=True)]
+        (tmp_path / "rows.csv").write_text("\n".join(["time,position", *rows]) + "\n")
+        return pz.load(tmp_path / "rows.csv", scenario=tmp_path / "spring.toml")
+
+    @pytest.mark.parametrize("begins", [4.0, 9.75])
+    @pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.FactorGraph()])
+    def test_recordings_that_begin_with_it_or_later(self, tmp_path, begins, estimator):
+        default = estimator.estimate(*self.load(tmp_path, begins))
+        given = estimator.estimate(*self.load(tmp_path, begins, "time = 4.0,", start="6.0"))
+        assert_array_equal(default.mean, given.mean)
+        assert_array_equal(default.covariance, given.covariance)
+        at_first = estimator.estimate(*self.load(tmp_path, begins, 'time = "first",'))
+        assert np.array_equal(at_first.mean, given.mean) == (begins == 4.0)
+
+    def test_a_recording_that_begins_earlier(self, tmp_path):
+        """The mean runs back along the motion, by the matrix exponential; and forward again it is the prior."""
+        problem, tracking = self.load(tmp_path, 1.0)
+        assert problem.prior_time == tracking.times[0] == 1.0
+        F = np.array([[0, 1], [-0.5, -0.1]])
+        values, vectors = np.linalg.eig(F)
+        back = (vectors @ np.diag(np.exp(-3.0 * values)) @ np.linalg.inv(vectors)).real
+        np.testing.assert_allclose(problem.prior.mean, back @ [1.0, 0.2], rtol=0, atol=1e-10)
+        forward = pz.predict(problem, problem.prior, 1.0, 3.0)
+        np.testing.assert_allclose(forward.mean, [1.0, 0.2], rtol=0, atol=1e-10)
+        np.testing.assert_allclose(forward.covariance, 0.09 * np.eye(2) + 2 * forward.Q, rtol=0, atol=1e-12)
+
+    def test_the_first_measurement_whenever_it_is(self, tmp_path):
+        problem, tracking = self.load(tmp_path, -7.0, 'time = "first",')
+        assert problem.prior_time is None
+        assert problem.prior_start(tracking.times) == -7.0
+
+    def test_one_that_is_too_early_for_the_noise_is_refused_with_its_file(self, tmp_path):
+        with pytest.raises(ValueError, match=r"rows.csv: the prior at 4 s cannot be propagated back .* process noise"):
+            self.load(tmp_path, 1.0, noise="1e-2")
+        with pytest.raises(ValueError, match=r"rows.csv: the prior at 4 s cannot be propagated back .* no state was found"):
+            self.load(tmp_path, -1e5)
+
+    def test_simulation_starts_there(self):
+        assert pz.load("b612-range")[0].prior_time == load_scenario("b612-range").times[0]

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         update,
     )
     from piazzi.estimate.long_steps import step_warning
+    from piazzi.estimate.prior import with_prior_at
     from piazzi.estimate.substeps import choose_substeps, substep_error
     from piazzi.evaluate import Comparison, Observability, WindowTrade, compare, observability, windows
     from piazzi.kernels import (
@@ -84,6 +85,7 @@ _WHERE = {
     "step_warning": "piazzi.estimate.long_steps",
     **dict.fromkeys(("kepler_transition", "propagate_kepler"), "piazzi.orbit"),
     **dict.fromkeys(("Study", "read_store"), "piazzi.study"),
+    "with_prior_at": "piazzi.estimate.prior",
     "simulate": "piazzi.simulation",
     "load": "piazzi.loading",
     "write_report": "piazzi.present.report",
@@ -154,6 +156,7 @@ __all__ = [
     "update",
     "windows",
     "with_gauss_markov",
+    "with_prior_at",
     "write_report",
 ]
 

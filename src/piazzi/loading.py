@@ -30,6 +30,9 @@ def load(
     scenario : name or path, optional
         The problem that a ``.csv`` measures.
 
+    The prior of a scenario stands at the start of its ``[times]``, or at the ``time`` of its ``[prior]``.  For a recording that
+    begins before that it is propagated back, see `with_prior_at`; for one that begins later, estimators propagate it forward.
+
     Raises
     ------
     OSError
@@ -43,6 +46,19 @@ def load(
     return problem, tracking
 
 
+def _from_prior_on(text: str, problem: Problem, tracking: Tracking) -> tuple[Problem, Tracking]:
+    """The same with the prior no later than the first measurement."""
+    first = float(tracking.times[0])
+    if problem.prior_time is None or problem.prior_time <= first:
+        return problem, tracking
+    from piazzi.estimate.prior import with_prior_at
+
+    try:
+        return with_prior_at(problem, first), tracking
+    except ValueError as error:
+        raise ValueError(f"{text}: {error}") from None
+
+
 def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None) -> tuple[Problem, Tracking]:
     kind = Path(text).suffix.lower()
     if scenario is not None and kind != ".csv":
@@ -54,14 +70,14 @@ def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None) -> tu
     if kind == ".nc":
         from piazzi.io.netcdf import read_netcdf
 
-        return read_netcdf(text)
+        return _from_prior_on(text, *read_netcdf(text))
     if kind == ".csv":
         from piazzi.io.csv import read_csv
 
         if scenario is None:
             raise ValueError(f"{text}: name the scenario that this .csv file measures: {', '.join(names())}, or a path")
         problem = load_scenario(scenario).problem
-        return problem, read_csv(text, problem)
+        return _from_prior_on(text, problem, read_csv(text, problem))
     if kind != ".toml" and os.path.isfile(text):
         raise ValueError(f"{text}: files end in {', '.join(KINDS)}, not {kind!r}")
     found = load_scenario(text)

@@ -88,7 +88,7 @@ def test_a_scenario_that_is_shown_can_be_used(call, tmp_path, name):
     text = call("scenarios", "show", name).out
     assert text == show(name)
     (tmp_path / "mine.toml").write_text(text)
-    assert call("scenarios", "check", tmp_path / "mine.toml").out == f"{tmp_path / 'mine.toml'}: nothing wrong\n"
+    assert call("scenarios", "check", tmp_path / "mine.toml").out == f"{tmp_path / 'mine.toml'}: nothing wrong; prior at 0 s\n"
 
 
 def test_all_faults_of_a_scenario_are_listed(call, tmp_path):

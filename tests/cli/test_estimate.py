@@ -75,7 +75,7 @@ def test_both_updates_run_on_both_experiments(call):
 def test_people_get_the_state_the_table_and_a_sentence(call):
     result = call("estimate", SCENARIO)
     assert result.status == 0
-    assert "100 epochs over 9.90 s, 100 measurements by radar, truth known" in result.out
+    assert "100 epochs over 9.90 s, 100 measurements by radar, truth known, prior at 0 s" in result.out
     assert "State at t = 9.9 s, ekf" in result.out
     assert "position error of ekf is" in result.out
     assert "\x1b" not in result.out  # no colours where nobody looks
@@ -233,3 +233,24 @@ def test_an_optimisation_tells_how_it_ended(call):
     (line,) = [s for s in call("estimate", SCENARIO, "--with", "graph").out.splitlines() if s.startswith("Solver")]
     assert line.startswith(f"Solver chain, started from ekf: {graph.iterations} iterations, cost {graph.details['cost']:.6g},")
     assert "Solver" not in call("estimate", SCENARIO).out
+
+
+def test_every_output_says_where_the_prior_stands(call, tmp_path):
+    scenario, rows = tmp_path / "late.toml", tmp_path / "rows.csv"
+    scenario.write_text(show("b612-range"))
+    text = "".join(f"{0.1 * k:.1f},8.9\n" for k in range(5, 25))
+    rows.write_text("time,range\n" + text)
+    arguments = (rows, "--scenario", scenario)
+    assert "prior at 0 s, 500 ms before the first epoch" in call("estimate", *arguments).out
+    assert call("estimate", *arguments, "--json").document["prior_time"] == 0.0
+    page = tmp_path / "page"
+    assert call("compare", *arguments, "--with", "ekf", "--report", page).status == 0
+    assert "prior at 0 s, 500 ms before the first epoch" in next(page.glob("*.html")).read_text()
+    early = show("b612-range-q0").replace("\n[times]", "\n[times]\nstart = 1.0 ")
+    scenario.write_text(early)
+    assert call("scenarios", "check", scenario).out == f"{scenario}: nothing wrong; prior at 1 s\n"
+    found = call("estimate", *arguments)
+    assert "prior at 0.5 s" in found.out
+    assert "rows.csv: begins at 0.5 s, before the prior at 1 s, which was propagated back" in found.err
+    scenario.write_text(early.replace("[prior]", "[prior]\ntime = 'first'"))
+    assert call("scenarios", "check", scenario).out.endswith("the prior is at the first measurement, whenever that is\n")

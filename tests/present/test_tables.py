@@ -44,10 +44,11 @@ def test_without_truth_there_is_no_column_of_errors(estimate):
 
 def test_a_summary_counts(estimate):
     text = summary(estimate.problem, estimate.tracking, "here")
-    assert text == "here: 100 epochs over 9.90 s, 100 measurements by radar, truth known"
+    assert text == "here: 100 epochs over 9.90 s, 100 measurements by radar, truth known, prior at 0 s"
     sparse = pz.Tracking([0.0, 1.0, 2.0], [1.0, np.nan, 3.0])
     assert (
-        summary(estimate.problem, sparse, "x") == "x: 3 epochs over 2.00 s, 2 measurements by radar, 1 missing, truth not known"
+        summary(estimate.problem, sparse, "x")
+        == "x: 3 epochs over 2.00 s, 2 measurements by radar, 1 missing, truth not known, prior at 0 s"
     )
     assert summary(estimate.problem, pz.Tracking([0.0], [1.0]), "x").startswith("x: 1 epoch, 1 measurement by")
 

@@ -135,6 +135,7 @@ def test_a_good_file_has_no_faults(checked):
         ("[times]", "[groups]\nposition = ['y']\n[times]", "groups.position", "is not a state"),
         ("[times]", "[picture]\nplanet_radius = -1\n[times]", "picture.planet_radius", "must be positive"),
         ("mean = [1.0, 0.0]", "mean = [1.0, 0.0]\ntime = 5.0", "prior.time", "after the first measurement"),
+        ("mean = [1.0, 0.0]", "mean = [1.0, 0.0]\ntime = 'frist'", "prior.time", "did you mean 'first'"),
     ],
 )
 def test_a_fault_is_told_with_its_place(checked, old, new, path, says):

@@ -31,7 +31,14 @@ def list_(as_json: bool) -> int:
     found = [load_scenario(name) for name in names()]
     if as_json:
         rows = [
-            {"name": s.name, "title": s.title, "epochs": len(s.times), "states": list(s.problem.model.names)} for s in found
+            {
+                "name": s.name,
+                "title": s.title,
+                "epochs": len(s.times),
+                "prior_time": s.problem.prior_time,
+                "states": list(s.problem.model.names),
+            }
+            for s in found
         ]
         output.print_json({"schema": "piazzi.scenarios/1", "scenarios": rows})
     else:
@@ -56,14 +63,26 @@ def show(name: str) -> int:
 @command.command()
 @click.argument("path", metavar="FILE")
 def check(path: str) -> int:
-    """List all that is wrong with a file."""
+    """List all that is wrong with a file, or say where its prior stands.
+
+    The prior is at the start of [times]; time = 5.0 in [prior] is another time, time = "first" the first measurement of
+    whatever is estimated.
+    """
     from piazzi.cli.running import say
     from piazzi.scenarios import check as faults_of
+    from piazzi.scenarios import load_scenario
 
     faults = faults_of(path)
     for fault in faults:
         say(f"{path}: {fault}")
     if faults:
         return BAD_INPUT
-    output.print_rich(f"{path}: nothing wrong")
+    scenario = load_scenario(path)
+    if scenario.problem.prior_time is None:
+        where = "the prior is at the first measurement, whenever that is"
+    else:
+        from piazzi.present.tables import prior_place
+
+        where = prior_place(scenario.problem, scenario.times)
+    output.print_rich(f"{path}: nothing wrong; {where}")
     return DONE

@@ -97,6 +97,7 @@ def to_dict(problem: Problem, tracking: Tracking, name: str, seed: int, output_f
         "seed": seed,
         "epochs": len(tracking.times),
         "measurements": len(tracking.row_times),
+        "prior_time": problem.prior_start(tracking.times),
         "integrator": steps(true_problem(problem).integrator),
         "states": list(problem.model.names),
         "units": {n: problem.model.unit(n) for n in problem.model.names},

@@ -38,7 +38,9 @@ def load_source(source: str, seed: int, scenario: str | None = None) -> Source:
         raise click.UsageError(f"{source}: --scenario NAME says what it measures", click.get_current_context(silent=True))
     if source != STDIN:
         problem, tracking = load(source, seed=seed, scenario=scenario)
-        return Source(problem, tracking, os.path.basename(source) or source, source.lower().endswith(RECORDINGS))
+        found = Source(problem, tracking, os.path.basename(source) or source, source.lower().endswith(RECORDINGS))
+        _tell_moved_prior(found, scenario)
+        return found
     path = _spooled(scenario)
     try:
         problem, tracking = load(path, seed=seed, scenario=scenario)
@@ -47,7 +49,22 @@ def load_source(source: str, seed: int, scenario: str | None = None) -> Source:
         raise ValueError(text.replace(str(path), "standard input")) from None
     finally:
         path.unlink(missing_ok=True)
-    return Source(problem, tracking, STDIN, path.suffix in RECORDINGS)
+    found = Source(problem, tracking, STDIN, path.suffix in RECORDINGS)
+    _tell_moved_prior(found, scenario)
+    return found
+
+
+def _tell_moved_prior(found: Source, scenario: str | None) -> None:
+    """Say it where a recording began before the prior of its scenario."""
+    first = float(found.tracking.times[0])
+    if scenario is None or found.problem.prior_time != first:
+        return
+    from piazzi.cli.running import say
+    from piazzi.scenarios import load_scenario
+
+    stood = load_scenario(scenario).problem.prior_time
+    if stood is not None and stood > first:
+        say(f"{found.name}: begins at {first:g} s, before the prior at {stood:g} s, which was propagated back")
 
 
 def load_problem(source: str) -> Problem:

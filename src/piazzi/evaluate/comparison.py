@@ -62,6 +62,7 @@ class Comparison:
             "schema": SCHEMA,
             "source": self.source,
             "epochs": len(self.tracking.times),
+            "prior_time": self.problem.prior_start(self.tracking.times),
             "states": list(self.problem.model.names),
             "rows": [row.to_dict() for row in self.rows],
         }

@@ -126,6 +126,7 @@ class Observability:
             "source": self.source,
             "states": list(model.names),
             "epochs": len(self.tracking.times),
+            "prior_time": self.problem.prior_start(self.tracking.times),
             **_information(self.information),
             "weakest_direction": self.weakest_direction,
             "twins": [_twin(twin) for twin in self.twins],

@@ -122,6 +122,7 @@ class WindowTrade:
             "schema": SCHEMA,
             "source": self.source,
             "epochs": len(self.tracking.times),
+            "prior_time": self.problem.prior_start(self.tracking.times),
             "states": list(self.problem.model.names),
             "iterations": self.iterations,
             "lags": self.lags.tolist(),

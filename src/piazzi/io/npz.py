@@ -57,6 +57,7 @@ def _problem(arrays: dict[str, Array]) -> Problem:
         stations=[Station(station.name, station.sensor, R)],
         parameters=base.parameters,
         integrator=Taylor(ceil(dt)),
+        prior_time=0.0,
         name=BASE,
     )
 

@@ -10,6 +10,7 @@ from piazzi.estimate import Estimate, Forecast
 from piazzi.evaluate.metrics import errors, residual_rms
 from piazzi.evaluate.quantities import display_of, duration, number, with_sigma
 from piazzi.problem import Problem, Tracking
+from piazzi.problem.checks import Array
 from piazzi.text import printable
 
 
@@ -21,7 +22,7 @@ def heading(problem: Problem, tracking: Tracking, source: str, remark: str = "")
 
 
 def summary(problem: Problem, tracking: Tracking, source: str) -> str:
-    """One line on what there is: source, epochs, how long, who measured, whether the truth is known."""
+    """One line on what there is: source, epochs, how long, who measured, whether the truth is known, where the prior stands."""
     times, count = tracking.times, len(problem.stations)
     span = f" over {duration(float(times[-1] - times[0]))}" if len(times) > 1 else ""
     stations = problem.stations[0].name if count == 1 else f"{count} stations"
@@ -31,8 +32,16 @@ def summary(problem: Problem, tracking: Tracking, source: str) -> str:
         f"{_count(len(tracking.row_times) - missing, 'measurement')} by {stations}",
         *([f"{missing:,} missing"] if missing else []),
         "truth known" if tracking.truth is not None else "truth not known",
+        prior_place(problem, tracking.times),
     ]
     return printable(", ".join(parts))
+
+
+def prior_place(problem: Problem, times: Array) -> str:
+    """At which time the prior stands, and how long before the first of these epochs."""
+    start = problem.prior_start(times)
+    before = float(times[0]) - start
+    return f"prior at {start:.12g} s" + (f", {duration(before)} before the first epoch" if before > 0 else "")
 
 
 def _count(many: int, what: str) -> str:

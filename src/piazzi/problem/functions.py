@@ -55,7 +55,7 @@ def step(problem: Problem, x: Any, dt: float, t: Any) -> tuple[Array, Array]:
     if not np.isfinite(dt):
         raise ValueError(f"dt is {dt} s; it must be finite")
     many, times, one = _states(problem, x, t)
-    n, count = problem.model.n, int(problem.integrator.counts(np.array([float(dt)]))[0])
+    n, count = problem.model.n, int(problem.integrator.counts(np.array([abs(float(dt))]))[0])
     out, Phi = np.empty((len(many), n)), np.empty((len(many), n, n))
     library = kernels.load(problem.spec("transition", "functions"))
     library.evaluate_step(len(many), times, float(dt), count, many, problem.given, out, Phi)

@@ -40,7 +40,7 @@ class Problem:
     integrator : Integrator
         Default `RungeKutta4()`, ten substeps per interval; `Discrete()` for a model that is a step.
     prior_time : float, optional
-        Seconds; default the first epoch of the tracking.
+        Seconds; default the first epoch of the tracking, whatever that is.  A scenario's is the start of its ``[times]``.
     truth : Truth, optional
         What simulation does differently.
     name : str
@@ -302,12 +302,18 @@ class Problem:
         moved = self.process_noise.axes != "states" and bool(self.process_noise.covariance.any())
         return self._integrated or moved or any(m.covariance.any() for m in self.manoeuvres)
 
+    def prior_start(self, times: Array) -> float:
+        """Time of the prior of a run over these epochs, in seconds."""
+        return float(times[0]) if self.prior_time is None else float(self.prior_time)
+
     def intervals(self, times: Array) -> tuple[float, Array, Array]:
         """Time of the prior, and for each epoch the substeps and the noise scale of the interval that ends there."""
         assert self.integrator is not None
-        start = float(times[0]) if self.prior_time is None else float(self.prior_time)
+        start = self.prior_start(times)
         if start > times[0]:
-            raise ValueError(f"the prior is at {start:g} s, after the first measurement at {times[0]:g} s")
+            raise ValueError(
+                f"the prior is at {start:g} s, after the first measurement at {times[0]:g} s: with_prior_at propagates it back"
+            )
         check_span(start, times[0], "the first measurement")
         if self.manoeuvres:
             manoeuvres.check_after(self.manoeuvres, start)

@@ -16,6 +16,7 @@ from piazzi.scenarios.faults import shown
 from piazzi.scenarios.table import Table
 from piazzi.units import ONE, Units
 
+FIRST = "first"  # measurement: where a prior stands that goes with any recording
 SPREADS = ("sigma", "variance", "covariance")
 
 
@@ -47,8 +48,13 @@ def read_spread(
     return None
 
 
-def read_prior(table: Table, physics: Physics, truth: Table, units: Units) -> tuple[Gaussian | None, float | None]:
-    """Belief about the states, and its time; ``mean = "truth"`` is the perfect guess."""
+def read_prior(
+    table: Table, physics: Physics, truth: Table, units: Units, start: float | None
+) -> tuple[Gaussian | None, float | None]:
+    """Belief about the states, and its time; ``mean = "truth"`` is the perfect guess.
+
+    The time is `start` where none is given, and None for ``time = "first"``: the first measurement, whenever that is.
+    """
     states = physics.states
     factors = physics.factors(states)
     if table.raw("mean") is None:
@@ -59,7 +65,11 @@ def read_prior(table: Table, physics: Physics, truth: Table, units: Units) -> tu
         source = Table({}, "", table.faults)
     mean = source.vector(key, states)
     P = read_spread(table, states, factors)
-    time = table.number("time", units.time())
+    if isinstance(table.raw("time"), str):
+        table.text("time", choices=(FIRST,))
+        time = None
+    else:
+        time = table.number("time", units.time()) if "time" in table else start
     table.finish(SPREADS)
     if mean is None or P is None:
         return None, time

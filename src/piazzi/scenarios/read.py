@@ -35,8 +35,10 @@ def read_scenario(data: Mapping[str, Any], name: str, faults: Faults) -> Scenari
     file = Table(data, "", faults)
     title, units = file.text("title", name), _units(file)
     with np.errstate(all="ignore"):
-        problem = read_problem(file, name, units)
         times = read_times(file.table("times"), units)
+        of_times = list(faults)
+        problem = read_problem(file, name, units, None if times is None else float(times[0]))
+        faults[:] = [*faults[len(of_times) :], *of_times]  # those of the equations and numbers first
         picture = Picture(file.table("picture").number("planet_radius", units.length(), positive=True))
         file.table("picture").finish(("planet_radius",))
         plan = read_plan(file.table("study"))
@@ -48,8 +50,8 @@ def read_scenario(data: Mapping[str, Any], name: str, faults: Faults) -> Scenari
     return Scenario(name, title or name, problem, times, picture, plan)
 
 
-def read_problem(file: Table, name: str, units: Units) -> Problem | None:
-    """The problem, or None after noting every fault."""
+def read_problem(file: Table, name: str, units: Units, start: float | None = None) -> Problem | None:
+    """The problem, or None after noting every fault; its prior is at `start` unless the file says otherwise."""
     before = len(file.faults)
     physics = read_physics(file, units)
     parameters = read_parameters(file.table("parameters"), physics, physics.model)
@@ -59,7 +61,7 @@ def read_problem(file: Table, name: str, units: Units) -> Problem | None:
     if not physics.states:
         return None
     stations = read_stations(file, physics)
-    prior, prior_time = read_prior(file.table("prior"), physics, file.table("truth"), units)
+    prior, prior_time = read_prior(file.table("prior"), physics, file.table("truth"), units, start)
     noise = read_noise(file.table("process_noise"), physics) if "process_noise" in file else None
     wandering = read_gauss_markov(file.table("gauss_markov"), physics, units) if "gauss_markov" in file else None
     manoeuvres = read_manoeuvres(file, physics, units)
@@ -87,13 +89,15 @@ def _check_size(problem: Problem, times: Array, faults: Faults) -> None:
     rows = len(times) * len(problem.stations)
     if rows > MAX_ROWS:
         faults.add("times", f"makes {rows:g} measurements; at most {MAX_ROWS:g} are allowed")
-    start = float(times[0]) if problem.prior_time is None else problem.prior_time
+    start = problem.prior_start(times)
     for m in problem.manoeuvres:
         if m.time <= start:
             faults.add("manoeuvres", f"the one at {m.time:g} s is not after the prior at {start:g} s")
     if faults:
         return
-    with faults.at("prior.time" if problem.prior_time is not None else "integrator"):
+    with faults.at("prior.time" if start != times[0] else "integrator"):
+        if start > times[0]:
+            raise ValueError(f"is {start:g} s, after the first measurement at {times[0]:g} s: simulation begins at the prior")
         steps = problem.intervals(times)[1].sum(dtype=float)
         if steps > MAX_STEPS:
             raise ValueError(f"makes {steps:g} steps in all; at most {MAX_STEPS:g} are allowed")
