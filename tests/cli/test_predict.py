@@ -73,3 +73,27 @@ def test_it_does_not_go_with_a_stream(call):
     assert (
         "--predict and --follow do not go together" in call("estimate", SCENARIO, "--follow", "-", "--predict", "1").refused()
     )
+
+
+def test_a_prediction_that_cannot_be_used_is_told(call, tmp_path):
+    """The state reaches infinity in half a second: status 3, as for an estimate that does."""
+    (tmp_path / "cube.toml").write_text(CUBE)
+    (tmp_path / "one.csv").write_text("time,range\n0,1\n")
+    command = ("estimate", tmp_path / "one.csv", "--scenario", tmp_path / "cube.toml", "--predict")
+    assert call(*command, "100ms").status == 0
+    done = call(*command, "3")
+    assert done.status == 3
+    assert done.said == ["piazzi: ekf: the prediction is not finite at t = 3 s (x)"]
+    document = call(*command, "3", "--json").document
+    assert document["rows"][0]["prediction"]["success"] is False
+    assert "not finite" in document["rows"][0]["prediction"]["message"]
+
+
+CUBE = """
+states = { x = "m" }
+dynamics = { x = "x**3" }
+sensors.r.components = { range = "x" }
+stations = [{ name = "s", sensor = "r", noise = { sigma = 1 } }]
+prior = { mean = [1], sigma = [1] }
+times = { step = 0.01, count = 5 }
+"""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from piazzi.cli import options, output
-from piazzi.cli.running import DONE, NOT_ESTIMATED
+from piazzi.cli.running import DONE, NOT_ESTIMATED, say
 
 if TYPE_CHECKING:
     from piazzi.estimate import Estimate, Forecast
@@ -83,7 +83,10 @@ def command(
             output.print_json(document)
     elif output_file != output.STDOUT:
         _print(comparison, source_name, output_file, forecasts)
-    return DONE if comparison.success else NOT_ESTIMATED
+    for name, forecast in forecasts.items():
+        if not forecast.success:
+            say(f"{name}: {forecast.message}")
+    return DONE if comparison.success and all(f.success for f in forecasts.values()) else NOT_ESTIMATED
 
 
 def _follow(
@@ -143,14 +146,15 @@ def _plain_details(estimate: Estimate) -> dict[str, Any]:
 
 
 def prediction(forecast: Forecast) -> dict[str, Any]:
-    """Times, means, covariances, standard deviations and their growth as lists, numbers that are not finite as None."""
+    """Whether it succeeded; times, means, covariances, sigmas and their growth as lists, what is not finite as None."""
     from piazzi.evaluate.quantities import finite
 
     def listed(values: Any) -> Any:
         return [listed(v) for v in values] if isinstance(values, list) else finite(values)
 
     names = ("times", "mean", "sigma", "growth", "covariance")
-    return {name: listed(getattr(forecast, name).tolist()) for name in names}
+    told = {"success": forecast.success, "message": forecast.message}
+    return told | {name: listed(getattr(forecast, name).tolist()) for name in names}
 
 
 def write(path: str, comparison: Comparison, document: dict[str, Any]) -> None:

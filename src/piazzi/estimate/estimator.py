@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
+from piazzi.estimate.soundness import defect
 from piazzi.problem import Problem, Tracking
-from piazzi.problem.checks import Array
+from piazzi.problem.checks import Array, Locked
 
 if TYPE_CHECKING:
     import xarray
@@ -28,7 +29,7 @@ class Estimator(Protocol):
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Estimate:
+class Estimate(Locked):
     """Result of an estimator.
 
     Attributes
@@ -112,13 +113,8 @@ class Estimate:
 
     def _defect(self) -> str:
         """The first epoch whose result cannot be used, "" if there is none."""
-        finite = np.isfinite(self.mean).all(axis=1) & np.isfinite(self.covariance).all(axis=(1, 2))
-        if not finite.all():
-            return self._at(int(np.argmin(finite)), "the estimate is not finite")
-        sound = semidefinite(self.covariance)
-        if not sound.all():
-            return self._at(int(np.argmin(sound)), "the covariance is not semidefinite")
-        return self._unpredicted()
+        found = defect(self.mean, self.covariance, self.names, lambda k: f"from epoch {k} (t = {self.times[k]:g} s)")
+        return found or self._unpredicted()
 
     def _unpredicted(self) -> str:
         """The first measurement that is there but has no prediction, "" if there is none."""
@@ -128,11 +124,6 @@ class Estimate:
         if not rows.size:
             return ""
         return f"the measurement of row {rows[0]} (t = {self.tracking.row_times[rows[0]]:g} s) has no prediction"
-
-    def _at(self, k: int, what: str) -> str:
-        bad = ~np.isfinite(self.mean[k])
-        state = f" ({', '.join(np.array(self.names)[bad])})" if bad.any() else ""
-        return f"{what} from epoch {k} (t = {self.times[k]:g} s){state}"
 
     def predict(self, times: Any) -> Forecast:
         """The last belief carried forward, with the process noise and manoeuvres on the way, and how it grows.
@@ -159,22 +150,3 @@ class Estimate:
         from piazzi.estimate.dataset import estimate_to_dataset
 
         return estimate_to_dataset(self)
-
-
-def semidefinite(P: Array, tolerance: float = 1e-8) -> Array:
-    """For each of the covariances (K, n, n), whether it is positive semidefinite up to rounding, (K,).
-
-    Elimination without pivoting on the correlation matrices, all epochs at once.
-    """
-    sigma = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2), 0.0))
-    unit = np.where(sigma > 0, sigma, 1.0)
-    C = P / (unit[:, :, None] * unit[:, None, :])
-    good = (np.diagonal(P, axis1=1, axis2=2) >= 0).all(axis=1)
-    for j in range(P.shape[1]):
-        pivot = C[:, j, j]
-        column = C[:, j + 1 :, j]
-        firm = pivot > tolerance
-        good &= (pivot >= -tolerance) & (firm | (np.abs(column) <= 10 * np.sqrt(tolerance)).all(axis=1))
-        step = np.where(firm, 1.0 / np.where(firm, pivot, 1.0), 0.0)
-        C[:, j + 1 :, j + 1 :] -= column[:, :, None] * column[:, None, :] * step[:, None, None]
-    return np.asarray(good)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.considered import STEP, has_considered, moved
+from piazzi.estimate.soundness import defect
 from piazzi.problem import Problem
-from piazzi.problem.checks import Array, numeric
+from piazzi.problem.checks import Array, Locked, numeric
 
 if TYPE_CHECKING:
     from piazzi.estimate.estimator import Estimate
@@ -19,7 +21,7 @@ MOST_PARTS = 10**7
 
 
 @dataclass(frozen=True, eq=False)
-class Forecast:
+class Forecast(Locked):
     """Beliefs carried forward from the last epoch of an estimate.
 
     Attributes
@@ -28,8 +30,9 @@ class Forecast:
     start : float, time of the last epoch, s
     times : (P,), s
     mean : (P, n), covariance : (P, n, n)
-    sigma : (P, n), standard deviations
+    sigma : (P, n), standard deviations, NaN where a variance is negative
     growth : (P, n), sigma over that at the last epoch; 1 where a value is known and stays so, infinite where it was known
+    success, message : every belief is finite with a semidefinite covariance; else which is not
     """
 
     problem: Problem
@@ -47,6 +50,14 @@ class Forecast:
     def names(self) -> tuple[str, ...]:
         """Names of the columns of `mean`."""
         return self.problem.model.names
+
+    @property
+    def success(self) -> bool:
+        return not self.message
+
+    @cached_property
+    def message(self) -> str:
+        return defect(self.mean, self.covariance, self.names, lambda k: f"at t = {self.times[k]:g} s", "the prediction")
 
     @property
     def sigma(self) -> Array:
@@ -100,8 +111,9 @@ def _carried(problem: Problem, way: tuple[Any, ...], x: Array, P: Array) -> tupl
 
 
 def _sigma(covariance: Array) -> Array:
-    """Standard deviations (P, n) of covariances (P, n, n)."""
-    return np.asarray(np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)))
+    """Standard deviations (P, n) of covariances (P, n, n), NaN for negative variances."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
 
 
 def _checked(times: Any, start: float) -> Array:

@@ -76,6 +76,7 @@ class GuardedLiveFilter(LiveFilter):
         Whether the gate rejected the last measurement.
     """
 
+    _shown: ClassVar[tuple[str, ...]] = (*LiveFilter._shown, "rejected")
     saved_names: ClassVar[tuple[str, ...]] = (*LiveFilter.saved_names, "epoch_values", "epoch_stations")
 
     def __init__(self, problem: Problem, fragments: tuple[str, ...], guard: Guard) -> None:
@@ -83,7 +84,7 @@ class GuardedLiveFilter(LiveFilter):
         m = problem.model.width
         parts = ("transition", problem.noise_fragment, *fragments, "epoch_guarded", "filter_live_guarded")
         self._library = kernels.load(problem.spec(*parts))
-        self._guard, self._thresholds = guard, guard.thresholds(m)
+        self._settings, self._guard, self._thresholds = (fragments, guard), guard, guard.thresholds(m)
         self._values, self._rows_of = np.empty((0, m)), np.empty(0, dtype=np.int64)
         self.rejected = False
 
@@ -129,10 +130,13 @@ class GuardedLiveFilter(LiveFilter):
         self.innovation[:], self.innovation_covariance[:] = nu[-1], S[-1]
         self.rejected, self._measured = bool(rejected[-1]), True
 
-    def checkpoint(self) -> dict[str, Array]:
-        return super().checkpoint() | {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
+    def _kept(self) -> dict[str, Array]:
+        return super()._kept() | {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
 
-    def restore(self, saved: Mapping[str, Array]) -> None:
-        rows = Saved(saved, self.problem).measurements("epoch_values", "epoch_stations")
-        super().restore(saved)
-        self._values, self._rows_of = rows
+    def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
+        values, rows_of = Saved(saved, self.problem).measurements("epoch_values", "epoch_stations")
+        return super()._checked(saved) | {"epoch_values": values, "epoch_stations": rows_of}
+
+    def _take(self, kept: Mapping[str, Array]) -> None:
+        super()._take(kept)
+        self._values, self._rows_of = kept["epoch_values"], kept["epoch_stations"]

@@ -10,6 +10,7 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.saved import Saved
+from piazzi.estimate.session import Session
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, check_span
 from piazzi.problem.inputs import unresolved
@@ -84,7 +85,13 @@ def checked_measurement(problem: Problem, stations: Mapping[str, int], station: 
     return s
 
 
-class LiveFilter:
+def clock_times(clock: Array) -> tuple[float | None, float | None]:
+    """The first two numbers of a checkpoint's clock, None for NaN."""
+    before, stands = (None if np.isnan(v) else float(v) for v in clock[:2])
+    return before, stands
+
+
+class LiveFilter(Session):
     """An extended Kalman filter in progress, from ``ExtendedKalmanFilter().start(problem)``.
 
     ``predict(t)`` moves to a time, ``update(station, z)`` takes a measurement there; several updates at one time are one epoch,
@@ -97,6 +104,7 @@ class LiveFilter:
     mean, covariance : (n,), (n, n)
         The current belief: predicted, or updated.  The arrays are reused: copy what you keep.
     innovation, innovation_covariance : (m,), (m, m), of the last update
+    success, message : whether the belief is finite with a semidefinite covariance; else why not
     """
 
     saved_names: ClassVar[tuple[str, ...]] = (
@@ -113,7 +121,7 @@ class LiveFilter:
     )
 
     def __init__(self, problem: Problem, fragments: tuple[str, ...]) -> None:
-        self.problem = problem
+        self.problem, self._settings = problem, (fragments,)
         self._clock = Clock(problem)
         self._stations = {s.name: i for i, s in enumerate(problem.stations)}
         n, m = problem.model.n, problem.model.width
@@ -199,8 +207,17 @@ class LiveFilter:
         self._update()
         self._measured = True
 
-    def checkpoint(self) -> dict[str, Array]:
-        """Everything that the next call depends on, as arrays; `restore` takes it back."""
+    # ---- what it stands on ---------------------------------------------------------------------------------------
+
+    @property
+    def _stands(self) -> float | None:
+        return self.time
+
+    def _beliefs(self) -> list[tuple[Array, Array]]:
+        predicted = (self._base_mean, self._base_covariance), (self._x_pred, self._P_pred)
+        return [(self.mean, self.covariance), *predicted, (self._d, self._P)]
+
+    def _kept(self) -> dict[str, Array]:
         stand = [np.nan if v is None else v for v in (self._clock.time, self._predicted_to)]
         return {name: getattr(self, "_" + name).copy() for name in _KEPT} | {
             "mean": self.mean.copy(),
@@ -208,16 +225,17 @@ class LiveFilter:
             "clock": np.array([*stand, float(self._measured)]),
         }
 
-    def restore(self, saved: Mapping[str, Array]) -> None:
-        """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
+    def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
         checked = Saved(saved, self.problem)
         vectors, matrices = ("base_mean", "x_pred", "d", "mean"), ("base_covariance", "P_pred", "P", "covariance")
         found = {name: checked.mean(name) for name in vectors} | {name: checked.covariance(name) for name in matrices}
-        found["times"] = checked.array("times", 4)
-        before, stands, (measured,) = checked.clock("clock", 3)
-        for name, value in found.items():
-            getattr(self, name if name in ("mean", "covariance") else "_" + name)[...] = value
-        self._clock.time, self._predicted_to, self._measured = before, stands, bool(measured)
+        return found | {"times": checked.array("times", 4), "clock": checked.clock("clock", 3)}
+
+    def _take(self, kept: Mapping[str, Array]) -> None:
+        for name in (*_KEPT, "mean", "covariance"):
+            getattr(self, name if name in ("mean", "covariance") else "_" + name)[...] = kept[name]
+        self._clock.time, self._predicted_to = clock_times(kept["clock"])
+        self._measured = bool(kept["clock"][2])
 
 
 _KEPT = ("base_mean", "base_covariance", "x_pred", "P_pred", "d", "P", "times")

@@ -7,15 +7,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from piazzi.estimate.live import Clock, checked_measurement
+from piazzi.estimate.live import Clock, checked_measurement, clock_times
 from piazzi.estimate.root import Root
 from piazzi.estimate.saved import Saved
+from piazzi.estimate.session import Session
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs
 
 
-class LiveRootFilter:
+class LiveRootFilter(Session):
     """An unscented or square-root filter in progress, from its ``start(problem)``.
 
     ``predict(t)`` moves to a time, ``update(station, z)`` takes a measurement there; several updates at one time are one epoch,
@@ -29,13 +30,15 @@ class LiveRootFilter:
         The current belief: predicted, or updated.
     innovation, innovation_covariance : (m,), (m, m), of the last update
     rejected : whether the gate rejected the last measurement
+    success, message : whether the belief is finite with a semidefinite covariance; else why not
     """
 
+    _shown: ClassVar[tuple[str, ...]] = (*Session._shown, "rejected")
     _arrays: ClassVar[tuple[str, ...]] = ("base_mean", "base_root", "root", "mean", "covariance")
     saved_names: ClassVar[tuple[str, ...]] = (*_arrays, "epoch_values", "epoch_stations", "clock")
 
     def __init__(self, problem: Problem, root: Root) -> None:
-        self.problem = problem
+        self.problem, self._settings = problem, (root,)
         self._kernel, self._clock = root.kernel(problem), Clock(problem)
         self._stations = {s.name: i for i, s in enumerate(problem.stations)}
         m = problem.model.width
@@ -97,19 +100,30 @@ class LiveRootFilter:
         self.mean, self.covariance, self.root = mean[0], P[0], root
         return nu, S, rejected
 
-    def checkpoint(self) -> dict[str, Array]:
-        """Everything that the next call depends on, as arrays; `restore` takes it back."""
+    # ---- what it stands on ---------------------------------------------------------------------------------------
+
+    @property
+    def _stands(self) -> float | None:
+        return self.time
+
+    def _beliefs(self) -> list[tuple[Array, Array]]:
+        return [(self.mean, self.covariance), (self.base_mean, self.covariance)]  # roots are of semidefinite ones
+
+    def _kept(self) -> dict[str, Array]:
         stand = [np.nan if v is None else v for v in (self._clock.time, self.time)]
         rows = {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
         return {name: getattr(self, name).copy() for name in self._arrays} | rows | {"clock": np.array(stand)}
 
-    def restore(self, saved: Mapping[str, Array]) -> None:
-        """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
+    def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
         checked, n = Saved(saved, self.problem), self.problem.model.n
-        base_mean, mean, covariance = checked.mean("base_mean"), checked.mean("mean"), checked.covariance("covariance")
-        base_root, root = checked.array("base_root", n, n), checked.array("root", n, n)
-        rows = checked.measurements("epoch_values", "epoch_stations")
-        before, stands, _ = checked.clock("clock", 2)
-        self.base_mean, self.base_root, self.root, self.mean, self.covariance = base_mean, base_root, root, mean, covariance
-        self._values, self._rows_of = rows
-        self._clock.time, self.time = before, stands
+        found = {name: checked.mean(name) for name in ("base_mean", "mean")}
+        found |= {name: checked.array(name, n, n) for name in ("base_root", "root")}
+        values, rows_of = checked.measurements("epoch_values", "epoch_stations")
+        rows = {"epoch_values": values, "epoch_stations": rows_of}
+        return found | rows | {"covariance": checked.covariance("covariance"), "clock": checked.clock("clock", 2)}
+
+    def _take(self, kept: Mapping[str, Array]) -> None:
+        for name in self._arrays:
+            setattr(self, name, kept[name])
+        self._values, self._rows_of = kept["epoch_values"], kept["epoch_stations"]
+        self._clock.time, self.time = clock_times(kept["clock"])

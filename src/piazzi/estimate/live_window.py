@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import isnan
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from piazzi.estimate.live import Clock, checked_measurement
 from piazzi.estimate.losses import Loss
 from piazzi.estimate.robust_window import row_space, window_fragments
 from piazzi.estimate.saved import MOST_STEPS, Saved, check_order, check_steps
+from piazzi.estimate.session import Session
 from piazzi.estimate.stretch import Stretch
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Gaussian, Problem
@@ -24,7 +25,7 @@ def window_opens(newest: Any, lag_seconds: float) -> Any:
     return newest - lag_seconds * (1 + 1e-12) - 4 * np.spacing(np.abs(newest))
 
 
-class LiveWindow:
+class LiveWindow(Session):
     """A sliding window in progress, from ``SlidingWindow(...).start(problem)``.
 
     ``update(station, z, t)`` takes a measurement: of a new time, of the newest epoch, or late but inside the window, where it
@@ -40,7 +41,10 @@ class LiveWindow:
     refused : list of (time, station)
     innovation, innovation_covariance : (m,), (m, m)
         Of the last row taken in; NaN before the first, and after one that came late, of which the window keeps none.
+    success, message : whether the beliefs of the window and before it are finite with semidefinite covariances; else why not
     """
+
+    _shown: ClassVar[tuple[str, ...]] = ("refused",)
 
     saved_names = (
         *("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before"),
@@ -51,7 +55,7 @@ class LiveWindow:
         self, problem: Problem, lag: int, lag_seconds: float | None, iterations: int, loss: Loss | None = None
     ) -> None:
         self.problem, self.lag, self.lag_seconds, self.iterations = problem, lag, lag_seconds, iterations
-        self._loss = loss
+        self._loss, self._settings = loss, (lag, lag_seconds, iterations, loss)
         self._clock = Clock(problem)
         self._stations = {s.name: i for i, s in enumerate(problem.stations)}
         fragments = window_fragments(problem, loss, "window_live", "predict")
@@ -251,8 +255,17 @@ class LiveWindow:
 
     # ---- checkpoints ---------------------------------------------------------------------------------------------
 
-    def checkpoint(self) -> dict[str, Array]:
-        """Everything that the next call depends on, as arrays; `restore` takes it back."""
+    @property
+    def _stands(self) -> float | None:
+        return self.time if self._pending is None else self._pending
+
+    def _beliefs(self) -> list[tuple[Array, Array]]:
+        window, found = self._window, [(self.mean, self.covariance), self._newest, (self._m, self._P)]
+        if len(window):
+            found += [(window.x[window.first], self._oldest_covariance[window.first])]
+        return found + [(x, self.covariance) for x in window.x[window.first : window.stop]]
+
+    def _kept(self) -> dict[str, Array]:
         window, out = self._window, {"m": self._m.copy(), "P": self._P.copy(), **self._window.copied()}
         W, J, m = len(window), window.rows, self.problem.model.width
         if W:
@@ -270,16 +283,16 @@ class LiveWindow:
             "refused": np.array([len(self.refused)], dtype=float),
         }
 
-    def restore(self, saved: Mapping[str, Array]) -> None:
-        """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
+    def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
         n, m = self.problem.model.n, self.problem.model.width
         unknown = np.full(m, np.nan), np.full((m, m), np.nan), np.array([np.nan])  # checkpoints of earlier versions
         saved = {**dict(zip(("innovation", "innovation_covariance", "pending"), unknown, strict=True)), **saved}
         checked = Saved(saved, self.problem)
         W, (z, station) = checked.length("t"), checked.measurements("z", "station")
         J = len(z)
-        before, P = checked.mean("m"), checked.covariance("P")
         found = {
+            "m": checked.mean("m"),
+            "P": checked.covariance("P"),
             "t": checked.array("t", W),
             "count": checked.whole("count", W, 0, MOST_STEPS),
             "scale": checked.array("scale", W),
@@ -288,29 +301,34 @@ class LiveWindow:
             "station": station,
             "x": checked.array("x", W, n),
             "x_before": checked.array("x_before", W, n),
+            "mean": checked.mean("mean"),
+            "covariance": checked.covariance("covariance"),
+            "innovation": checked.array("innovation", m, missing=True),
+            "innovation_covariance": checked.array("innovation_covariance", m, m, missing=True),
+            "pending": checked.array("pending", 1, missing=True),
         }
         check_order(found["t"], found["first_row"], J)
         check_steps(found["t"], found["count"], found["scale"], self._clock.step)
-        mean, covariance = checked.mean("mean"), checked.covariance("covariance")
-        nu = checked.array("innovation", m, missing=True)
-        S = checked.array("innovation_covariance", m, m, missing=True)
-        (pending,) = checked.array("pending", 1, missing=True).tolist()
-        newest = float(found["t"][-1]) if W else self.problem.prior_time
+        newest, (pending,) = float(found["t"][-1]) if W else self.problem.prior_time, found["pending"].tolist()
         if newest is not None and pending < newest:
             raise ValueError(f"the checkpoint's 'pending' is {pending:g} s; the newest epoch is at {newest:g} s")
         if W:
-            linear = checked.array("nu_lin", J * m, missing=True), checked.array("H_lin", J * m, n), checked.array("dx", W, n)
-            oldest = checked.covariance("oldest_covariance")
-        self._m, self._P = before.copy(), P.copy()  # from here on, nothing can go wrong
-        self._window = Stretch.of(n, m, found)
-        self.mean, self.covariance = mean, covariance
-        self._newest = mean.copy(), covariance.copy()
-        self.innovation, self.innovation_covariance = nu, S
+            shapes = {"nu_lin": (J * m,), "H_lin": (J * m, n), "dx": (W, n)}
+            found |= {name: checked.array(name, *shape, missing=name == "nu_lin") for name, shape in shapes.items()}
+            found["oldest_covariance"] = checked.covariance("oldest_covariance")
+        return found
+
+    def _take(self, kept: Mapping[str, Array]) -> None:
+        self._m, self._P = kept["m"].copy(), kept["P"].copy()
+        self._window = Stretch.of(self.problem.model.n, self.problem.model.width, kept)
+        self.mean, self.covariance = kept["mean"], kept["covariance"]
+        self._newest = self.mean.copy(), self.covariance.copy()
+        self.innovation, self.innovation_covariance = kept["innovation"], kept["innovation_covariance"]
         self._bind()
-        if W:
-            for values, kept in zip(self._linear, linear, strict=True):
-                values[: len(kept)] = kept
-            self._oldest_covariance[0] = oldest
+        if len(self._window):
+            for values, name in zip(self._linear, ("nu_lin", "H_lin", "dx"), strict=True):
+                values[: len(kept[name])] = kept[name]
+            self._oldest_covariance[0] = kept["oldest_covariance"]
         self._pending = None
-        if not isnan(pending):
-            self.predict(pending)
+        if not isnan(kept["pending"][0]):
+            self.predict(float(kept["pending"][0]))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate.estimator import semidefinite
+from piazzi.estimate.soundness import semidefinite
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, numeric
 
@@ -90,15 +90,14 @@ class Saved:
         rows = self.length(values)
         return self.array(values, rows, self._width, missing=True), self.whole(stations, rows, 0, self._stations - 1)
 
-    def clock(self, name: str, size: int) -> tuple[float | None, float | None, Array]:
-        """Time of the epoch before and of the one that stands, None where there is none yet; and the marks behind, 0 or 1."""
+    def clock(self, name: str, size: int) -> Array:
+        """Time of the epoch before and of the one that stands, NaN where there is none yet; and marks behind, 0 or 1."""
         out = self.array(name, size, missing=True)
-        before, stands = (None if np.isnan(v) else float(v) for v in out[:2])
-        if before is not None and (stands is None or stands < before):
-            raise ValueError(f"the checkpoint's {name!r} has an epoch at {out[1]:g} s after one at {before:g} s")
+        if not (np.isnan(out[0]) or out[1] >= out[0]):
+            raise ValueError(f"the checkpoint's {name!r} has an epoch at {out[1]:g} s after one at {out[0]:g} s")
         if not np.isin(out[2:], (0, 1)).all():
             raise ValueError(f"the checkpoint's {name!r} ends in {out[-1]:g}; it must be 0 or 1")
-        return before, stands, out[2:]
+        return out
 
     def _found(self, name: str) -> Any:
         if name not in self._arrays:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from piazzi.problem.checks import Array
@@ -92,7 +94,7 @@ class Stretch:
         return out | {"first_row": self.first_row[self.first : self.stop + 1] - row}
 
     @classmethod
-    def of(cls, n: int, m: int, arrays: dict[str, Array]) -> Stretch:
+    def of(cls, n: int, m: int, arrays: Mapping[str, Array]) -> Stretch:
         """The stretch that such copies are of."""
         out = cls(n, m)
         W, J = len(arrays["t"]), len(arrays["z"])

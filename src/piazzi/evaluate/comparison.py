@@ -45,6 +45,12 @@ class Comparison:
     estimates: Mapping[str, Estimate]
     source: str = ""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "estimates", MappingProxyType(dict(self.estimates)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Comparison, (self.problem, self.tracking, self.rows, dict(self.estimates), self.source)  # views have no pickle
+
     @property
     def success(self) -> bool:
         """Whether every estimator succeeded."""
@@ -128,7 +134,7 @@ def compare(
         else:
             estimates[name] = estimate
         rows += found
-    return Comparison(problem, tracking, tuple(rows), MappingProxyType(estimates), source)
+    return Comparison(problem, tracking, tuple(rows), estimates, source)
 
 
 def bounds_of(problem: Problem, tracking: Tracking) -> Bounds | None:

@@ -32,6 +32,14 @@ def lock(value: Any) -> None:
             lock(part)
 
 
+class Locked:
+    """A frozen dataclass whose copies can be written into as little as itself; parts that are such see to it themselves."""
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        lock([value for value in state.values() if not is_dataclass(value)])
+
+
 def numeric(value: Any, what: str) -> Array:
     """A copy of the value as a float64 array, row by row; raises ValueError where it is not made of real numbers."""
     try:

@@ -9,11 +9,11 @@ from typing import Any, Literal
 import numpy as np
 
 from piazzi.kernels import Integrator
-from piazzi.problem.checks import Array, numeric
+from piazzi.problem.checks import Array, Locked, numeric
 
 
 @dataclass(frozen=True, eq=False)
-class Gaussian:
+class Gaussian(Locked):
     """A belief: mean (n,) and covariance (n, n), in the order and the units of the states.
 
     A vector of n numbers as covariance is its diagonal; one number each describes a single value.
@@ -29,7 +29,7 @@ class Gaussian:
 
 
 @dataclass(frozen=True, eq=False)
-class ProcessNoise:
+class ProcessNoise(Locked):
     """White noise that drives the states.
 
     Parameters
@@ -64,7 +64,7 @@ class ProcessNoise:
 
 
 @dataclass(frozen=True, eq=False)
-class Station:
+class Station(Locked):
     """A place that measures: a sensor of the model, its noise R (m, m) and the sensor's own numbers.
 
     `noise` is a full covariance matrix, a diagonal, or one variance; SI units and radians.  A number that is not known for

@@ -1,0 +1,94 @@
+"""What live estimates have in common: whether they can be used, checkpoints, and copies that go on by themselves."""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from piazzi.estimate.soundness import defect
+from piazzi.problem import Problem
+from piazzi.problem.checks import Array
+
+
+class Session(ABC):
+    """An estimate in progress.
+
+    Attributes
+    ----------
+    success, message : whether every belief is finite with a semidefinite covariance; else why not.  Looked at when asked for
+    """
+
+    problem: Problem
+    _settings: tuple[Any, ...]
+    # What copies have and checkpoints need not: nothing to come depends on it
+    _shown: ClassVar[tuple[str, ...]] = ("innovation", "innovation_covariance")
+
+    @property
+    @abstractmethod
+    def _stands(self) -> float | None:
+        """Time that the beliefs are for."""
+
+    @abstractmethod
+    def _beliefs(self) -> list[tuple[Array, Array]]:
+        """Every mean (n,) with its covariance (n, n) that the next call depends on, that to be read first."""
+
+    @abstractmethod
+    def _kept(self) -> dict[str, Array]:
+        """Copies of everything that the next call depends on."""
+
+    @abstractmethod
+    def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
+        """The same, out of what may be anything; raises ValueError where it does not fit."""
+
+    @abstractmethod
+    def _take(self, kept: Mapping[str, Array]) -> None:
+        """Go on from there."""
+
+    @property
+    def success(self) -> bool:
+        return not self.message
+
+    @property
+    def message(self) -> str:
+        means, covariances = zip(*self._beliefs(), strict=True)
+        t = self._stands
+        place = "" if t is None else f"at t = {t:g} s"
+        return defect(np.array(means), np.array(covariances), self.problem.model.names, lambda k: place).rstrip()
+
+    def checkpoint(self) -> dict[str, Array]:
+        """Everything that the next call depends on, as arrays; `restore` takes it back.
+
+        Raises
+        ------
+        ValueError
+            Where it could not be taken back, because the estimate cannot be used: `message` says why.
+        """
+        if not self.success:
+            raise ValueError(self.message)
+        kept = self._kept()
+        self._checked(kept)
+        return kept
+
+    def restore(self, saved: Mapping[str, Array]) -> None:
+        """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
+        self._take(self._checked(saved))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        shown = {name: copy.copy(getattr(self, name)) for name in self._shown}
+        return type(self), (self.problem, *self._settings), (self._kept(), shown)
+
+    def __setstate__(self, state: tuple[dict[str, Array], dict[str, Any]]) -> None:
+        kept, shown = state
+        self._take(kept)
+        for name, value in shown.items():
+            if isinstance(value, np.ndarray):
+                getattr(self, name)[...] = value  # where kernels write to
+            else:
+                setattr(self, name, value)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return copy.copy(self)  # shares the problem and the settings, which do not change, and nothing else
