@@ -57,7 +57,7 @@ USAGE = ("", "estimate", "estimate nowhere.nc", "estimate own.nc --seed x", "sim
 OPTIONAL = {"IPython", "bokeh", "dask", "distributed"}
 PACKAGES = (
     *("click", "h5netcdf", "h5py", "llvmlite", "matplotlib", "numba", "numpy", "pandas", "rich", "sympy", "xarray"),
-    *("pyerfa", "astropy-iers-data", "dask", "distributed", "bokeh", "pydantic"),
+    *("pyerfa", "astropy-iers-data", "dask", "distributed", "bokeh"),
 )
 
 

@@ -2,11 +2,12 @@
 
 import re
 import tomllib
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
 
-from tests.smoke.versions import lowest, newest, requirements
+from tests.smoke.versions import lowest, newest, parts, requirements
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -46,6 +47,14 @@ def test_all_that_is_needed_has_a_lowest_version():
 def test_packages_whose_insides_are_used_have_a_version_to_stop_at():
     bounded = {re.match(r"[\w-]+", text)[0] for text in PROJECT["dependencies"] if "<" in text}
     assert bounded == PRIVATE
+
+
+def test_all_that_is_needed_is_imported_somewhere():
+    sources = [file.read_text(encoding="utf-8") for file in (ROOT / "src").rglob("*.py")]
+    found = {name for source in sources for name in re.findall(r"(?m)^\s*(?:from|import) (\w+)", source)}
+    bring = packages_distributions()
+    used = {distribution.lower() for name in found for distribution in bring.get(name, [])}
+    assert {parts(requirement)[0].lower() for requirement in PROJECT["dependencies"]} - used == set()
 
 
 def test_pins_are_no_nightlies_are_within_the_bounds_and_name_no_index():
