@@ -117,7 +117,7 @@ class BatchLeastSquares:
         used = "prior" if self.start is None else "given"
         patience = self.max_iterations if self.start is not None else min(self.max_iterations, PATIENCE)
         outcome = optimize(chain, solver, np.broadcast_to(first, chain.x.shape), patience, self.tolerance)
-        if not outcome.failure:
+        if not (outcome.failure or "remark" in outcome.details):
             return outcome, used
         graph = nominal(FactorGraph(), calm, tracking)
         begin = np.asarray(graph.details["first_state"]) if graph.success else chain.x[0].copy()

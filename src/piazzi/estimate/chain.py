@@ -40,6 +40,11 @@ def chain_fragments(problem: Problem, *last: str) -> tuple[str, ...]:
     )
 
 
+def graph_fragments(problem: Problem) -> tuple[str, ...]:
+    """Fragments that linearise a whole graph."""
+    return ("graph_linearize", "graph_weigh") if problem.noise_varies else ("graph_linearize",)
+
+
 ROUNDING = 4 * float(np.finfo(float).eps)
 
 
@@ -70,7 +75,7 @@ class Chain:
     def __init__(self, problem: Problem, inputs: Inputs) -> None:
         self.problem, self.inputs = problem, inputs
         self.library = kernels.load(
-            problem.spec(*chain_fragments(problem, "graph_linearize"), lanes=lanes_for(problem.model.n))
+            problem.spec(*chain_fragments(problem, *graph_fragments(problem)), lanes=lanes_for(problem.model.n))
         )
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
         J = len(inputs.z)
@@ -82,6 +87,8 @@ class Chain:
         self.broken, self.report = np.zeros((K, N)), np.zeros(9)
         self.tether = tether_of(problem)
         self._linearize = self._bind_linearize()
+        if problem.noise_varies:
+            self._bind_weigh()
 
     def _bind_linearize(self) -> Callable[[], None]:
         i, p = self.inputs, self.problem
@@ -107,10 +114,31 @@ class Chain:
         )
         return bound
 
+    def _bind_weigh(self) -> None:
+        """What judges a step by the process noise that it was solved with, where that depends on the states."""
+        i, Q = self.inputs, self.problem.process_noise.covariance
+        self.Q_before, self.broken_now, self._weighed = np.empty_like(self.Q_all), np.zeros_like(self.x), np.zeros(9)
+        self._weigh: Callable[[], None] = self.library.graph_weigh.bind(
+            i.epochs, i.scale, Q, self.x, self.f, self.Q_before, self.tether, self.broken_now, self._weighed
+        )
+
     def linearize(self) -> float:
         """Linearise about `x`; the cost there, half the sum of squares."""
         self._linearize()
         return 0.5 * float(self.report[: PRIOR + 1].sum())
+
+    def keep_noise(self) -> None:
+        """Remember the process noise of the present linearisation for `as_solved`."""
+        if self.problem.noise_varies:
+            self.Q_before[:] = self.Q_all
+
+    def as_solved(self) -> tuple[float, Array]:
+        """Cost, and defects without noise, of the present states under the process noise that was kept."""
+        report = self.report
+        if not self.problem.noise_varies:
+            return 0.5 * float(report[: PRIOR + 1].sum()), self.broken
+        self._weigh()
+        return 0.5 * float(report[MEASUREMENT] + report[PRIOR] + self._weighed[DYNAMICS]), self.broken_now
 
     def largest_step(self, covariance: Array) -> float:
         """The largest step in standard deviations, without rounding; infinite where a value that is certain moves."""
@@ -128,6 +156,12 @@ class Chain:
     def change(self, changes: Array) -> float:
         """What changes (K, n) of the states make of all measurements, in units of their noise, as a length."""
         return float(np.linalg.norm(np.where(np.isnan(self.nu), 0.0, self.by_measurement(changes))))
+
+    def in_sigmas(self, changes: Array) -> Array:
+        """Changes (K, n) of states in their predicted sigmas, then of measurements in units of their noise, (K n + J m,)."""
+        sigma = np.sqrt(np.diagonal(self.P_pred, axis1=1, axis2=2))
+        states = changes / np.where(sigma > 0, sigma, 1.0)
+        return np.concatenate([states.ravel(), np.where(np.isnan(self.nu), 0.0, self.by_measurement(changes)).ravel()])
 
     def by_measurement(self, changes: Array) -> Array:
         """Changes (K, n) of the states as changes of the measurements in units of their noise, (J, m)."""

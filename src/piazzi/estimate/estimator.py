@@ -46,7 +46,8 @@ class Estimate(Locked):
     delayed : a window's states as they left it, else None
     details : figures of the particular estimator, such as "cost" or "solver"
     failure : why the estimator gave up, "" where it finished
-    success, message : finished, with finite means and semidefinite covariances; else why not
+    success : whether it finished, with finite means and semidefinite covariances
+    message : why not; of a success, what should be known about it, "" if there is nothing (``details["remark"]``)
     """
 
     problem: Problem
@@ -105,10 +106,14 @@ class Estimate(Locked):
 
     @property
     def success(self) -> bool:
-        return not self.message
+        return not self._why_not
+
+    @property
+    def message(self) -> str:
+        return self._why_not or str(self.details.get("remark", ""))
 
     @cached_property
-    def message(self) -> str:
+    def _why_not(self) -> str:
         return self.failure or self._defect()
 
     def _defect(self) -> str:

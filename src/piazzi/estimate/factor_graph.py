@@ -58,8 +58,11 @@ class FactorGraph:
     Notes
     -----
     Each step is a linearised Kalman filter forward and a Bryson-Frazier recursion back, so process noise may be singular or
-    zero.  Steps that raise the cost are damped (Levenberg-Marquardt, scaled by the prior covariance), except the first, whose
-    cost says nothing: a start that leaves the dynamics has any cost at all.  With singular noise "cost" uses the
+    zero.  Steps that raise the cost are shortened or damped (Levenberg-Marquardt, scaled by the prior covariance), except the
+    first, whose cost says nothing: a start that leaves the dynamics has any cost at all.  Where Gauss-Newton is slow or repels,
+    its last steps are extrapolated; where iterations run out within 1e-3 sigma of the end, the result succeeds and its message
+    says how far it may be off.  Process noise that depends on the states is that of the newest states, held fixed within an
+    iteration: what is found is a fixed point of that.  With singular noise "cost" uses the
     pseudo-inverse of Q and stands beside "defect", the largest violation of the dynamics in prior standard deviations.
 
     With a loss the cost is the robust one, found by iterated reweighting; the start is a filter with a gate, and where the
@@ -70,7 +73,7 @@ class FactorGraph:
     """
 
     start: Any = "ekf"
-    max_iterations: int = 50
+    max_iterations: int = 100
     tolerance: float = 1e-6
     cross_covariances: bool = False
     solver: str = "auto"
@@ -187,7 +190,11 @@ class FactorGraph:
         x = chain.x.copy()
         other = descend(chain, solver, states, min(self.max_iterations, CHALLENGE), self.tolerance)
         if not other.failure and other.details["cost"] < outcome.details["cost"] - 1e-6:
-            return replace(other, iterations=outcome.iterations + other.iterations), True
+            spent = outcome.iterations + other.iterations
+            if "remark" in other.details:  # on the way to the better one, which deserves as many iterations as the first
+                other = descend(chain, solver, chain.x.copy(), self.max_iterations, self.tolerance)
+                spent += other.iterations
+            return replace(other, iterations=spent), True
         stand(chain, solver, x)
         return outcome, False
 

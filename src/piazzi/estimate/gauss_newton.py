@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isfinite, sqrt
 from typing import Any
 
 import numpy as np
 
 from piazzi.estimate.chain import DEFECT, GRADIENT, ROUNDING, STEP, STEP_SMOOTHED, Chain, Solver
+from piazzi.estimate.extrapolation import NEAR, Extrapolation
 from piazzi.problem.checks import Array
 
 TOO_WIDE = "the prior is too wide for covariances"
 FIRST_DAMPING, LARGEST_DAMPING = 1e-4, 1e12
 NEARLY, ROUGHLY = 3e-3, 10.0  # steps below so much of a sigma may be rounding, within so many times its estimate
+PARTS = (0.5, 0.25, 0.125)  # of a step near a solution, where the whole goes too far
+GRADED = 1e-3  # sigma: as good as converged for any use, and worth a remark
 AMPLIFIED = 1e3  # times the last bits of the states: steps beyond that are none of rounding, which is dear to estimate
 SHRINKING = 0.05  # of the step before, or less: what a step near a solution is, unless it is rounding or converges slowly
 
@@ -32,52 +37,77 @@ def optimize(
 ) -> Outcome:
     """Iterate from the states `start` until no state and no measurement moves by more than `tolerance` standard deviations.
 
-    Measurements count too because a combination of states can be known much better than each of them.  Small steps that do
-    not shrink much and are no larger than what rounding of the states makes of them end the iterations as well.
+    Measurements count too because a combination of states can be known much better than each of them; where steps shrink
+    slowly, what counts is where they lead (`Extrapolation`).  Small steps that do not shrink much and are no larger than what
+    rounding of the states makes of them end the iterations as well, and iterations that are spent within `GRADED` standard
+    deviations of the end are a success with a remark.
     A step that raises the merit is damped as much as it takes (Levenberg-Marquardt, scaled by the prior), except the first.
-    The merit is the cost, and for directions without noise, where the dynamics must hold, twice the defect at the price of
-    its multiplier (an exact penalty: Nocedal and Wright 2006, eq. 15.24).  Ends at once, with the failure `TOO_WIDE`, where
-    a predicted measurement has more than `widest` times the variance of its noise.
+    The merit is the cost under the process noise that the step was solved with, and for directions without noise, where the
+    dynamics must hold, twice the defect at the price of its multiplier (an exact penalty: Nocedal and Wright 2006, eq. 15.24).
+    Ends at once, with the failure `TOO_WIDE`, where a predicted measurement has more than `widest` times the variance of its
+    noise.
     """
     start = solver.begin(start)
     chain.x[:] = start
     if not np.isfinite(start).all():
         return _without_start(chain)
-    cost, damping, failure = chain.linearize(), 0.0, f"not converged after {max_iterations} iterations"
-    costs, covariance, iteration, before, stopped = [cost], None, 0, np.inf, ""
+    cost, damping, failure, stopped = chain.linearize(), 0.0, f"not converged after {max_iterations} iterations", ""
+    costs, covariance, iteration, before, past = [cost], None, 0, np.inf, Extrapolation()
     for iteration in range(1, max_iterations + 1):
-        solver.solve(damping)
+        solver.solve(0.0)
         if iteration == 1 and widest < solver.widest() < np.inf:
             return Outcome(chain.P_pred, iteration, TOO_WIDE, _figures(chain, solver, costs))
         size = _size(chain)
-        stuck = damping == 0.0 and NEARLY > size > max(SHRINKING * before, tolerance) and not chain.reweighted
-        at_rounding = (
-            stuck and size <= AMPLIFIED * _measured(chain, _last_bits(chain)) and size <= ROUGHLY * _rounding(chain, solver)
-        )
-        if damping == 0.0 and np.isfinite(cost) and (size <= tolerance or at_rounding):
-            covariance = solver.marginals()
-            if chain.report[STEP_SMOOTHED] <= (NEARLY if at_rounding else tolerance):
-                chain.x[:] = solver.moved(chain.x, chain.dx)
-                chain.d_pred -= chain.dx  # predictions are about the states as they now are
+        ahead = past.step(chain, size)
+        at_rounding = _at_rounding(chain, solver, size, before, tolerance)
+        if isfinite(cost) and (at_rounding or _far(chain, size, ahead) <= tolerance):
+            covariance = _ended(chain, solver, ahead, NEARLY if at_rounding else tolerance)
+            if covariance is not None:
                 failure, stopped = "", "steps are rounding" if at_rounding else f"no step above {tolerance:g} sigma"
                 break
-            covariance = None
         before = size
-        accepted, cost, damping = _step(chain, solver, cost, damping, gated=iteration > 1)
+        accepted, cost, damping = _step(chain, solver, cost, damping, ahead, size < NEAR, gated=iteration > 1)
         costs.append(cost)
         if not accepted:
             failure = "no step lowers the cost, however small"
             break
+    details = {}
     if failure:
         failure += _weakest(chain)
         solver.solve(0.0)
+        size = _size(chain)
+        off = _far(chain, size, past.step(chain, size))
+        if off <= GRADED and isfinite(cost):
+            details, stopped, failure = {"remark": f"found to {off:.1g} sigma only: {failure}"}, failure, ""
     covariance = solver.marginals() if covariance is None else covariance
-    return Outcome(covariance, iteration, failure, _figures(chain, solver, costs) | {"stopped": failure or stopped})
+    return Outcome(covariance, iteration, failure, _figures(chain, solver, costs) | {"stopped": failure or stopped} | details)
+
+
+def _ended(chain: Chain, solver: Solver, ahead: Array | None, tolerance: float) -> Array | None:
+    """Covariances (K, n, n) after a last step, None where that is too large beside these, and is not taken."""
+    covariance = solver.marginals()
+    last = chain.dx if ahead is None else ahead
+    if max(chain.report[STEP_SMOOTHED], 0.0 if ahead is None else chain.largest(ahead, covariance)) > tolerance:
+        return None
+    chain.x[:] = solver.moved(chain.x, last)
+    chain.d_pred -= last  # predictions are about the states as they now are
+    return covariance
+
+
+def _far(chain: Chain, size: float, ahead: Array | None) -> float:
+    """How far the solution may be, in the measure of `_size`."""
+    return size if ahead is None else max(size, _measured(chain, ahead))
+
+
+def _at_rounding(chain: Chain, solver: Solver, size: float, before: float, tolerance: float) -> bool:
+    """Whether a step of this size is nothing but rounding."""
+    stuck = NEARLY > size > max(SHRINKING * before, tolerance) and not chain.reweighted
+    return stuck and size <= AMPLIFIED * _measured(chain, _last_bits(chain)) and size <= ROUGHLY * _rounding(chain, solver)
 
 
 def _size(chain: Chain) -> float:
     """The step that was solved for, in standard deviations: the largest of any state, or of the measurements together."""
-    return float(max(chain.report[STEP], np.sqrt(chain.report[GRADIENT])))
+    return max(float(chain.report[STEP]), sqrt(chain.report[GRADIENT]))
 
 
 def _last_bits(chain: Chain) -> Array:
@@ -107,24 +137,60 @@ def _rounding(chain: Chain, solver: Solver) -> float:
     return _measured(chain, other - step)
 
 
-def _step(chain: Chain, solver: Solver, cost: float, damping: float, gated: bool) -> tuple[bool, float, float]:
+def _step(
+    chain: Chain, solver: Solver, cost: float, damping: float, ahead: Array | None, near: bool, gated: bool
+) -> tuple[bool, float, float]:
     """Take a step that does not raise the merit (not gated: that stays finite).
 
-    Returns whether there was one, the cost after it, and the damping of the next.
+    Where the first does, one more from there may make up for it, as in a curved valley.  Returns whether there was a step, the
+    cost after it, and the damping of the next.
     """
-    x, broken = chain.x.copy(), chain.broken.copy()
-    while True:
-        chain.x[:] = solver.moved(x, chain.dx)
-        new = chain.linearize()
-        merit, merit_new = _merit(cost, chain.multiplier, broken), _merit(new, chain.multiplier, chain.broken)
-        if np.isfinite(merit_new) and (not gated or _lower(chain, merit_new, merit)):
-            return True, new, 0.0 if damping <= FIRST_DAMPING else damping / 10.0
-        damping = max(10.0 * damping, FIRST_DAMPING)
+    x, price = chain.x.copy(), np.abs(chain.multiplier)
+    merit = _merit(cost, price, chain.broken)
+    chain.keep_noise()
+    for step, used, later in _trials(chain, solver, damping, ahead, near):
+        new, good = _tried(chain, solver, x, step, merit, price, gated)
+        if not good and isfinite(new):
+            solver.solve(used)
+            new, good = _tried(chain, solver, chain.x.copy(), chain.dx, merit, price, gated)
+        if good:
+            return True, new, later
         chain.x[:] = x
         chain.linearize()
-        if damping > LARGEST_DAMPING:
-            return False, cost, damping
+    return False, cost, damping
+
+
+def _trials(
+    chain: Chain, solver: Solver, damping: float, ahead: Array | None, near: bool
+) -> Iterator[tuple[Array, float, float]]:
+    """Steps to try, each from the chain as it was, their damping, and that of the next iteration: what was needed is kept."""
+    if ahead is not None:
+        yield ahead, 0.0, _relaxed(damping)
         solver.solve(damping)
+    elif damping > 0.0:
+        solver.solve(damping)
+    yield chain.dx, damping, _relaxed(damping)
+    for part in PARTS if near and damping == 0.0 else ():  # damping would hold back what the step is right about
+        solver.solve(0.0)
+        yield part * chain.dx, 0.0, 0.0
+    while damping <= LARGEST_DAMPING:
+        damping = max(10.0 * damping, FIRST_DAMPING)
+        solver.solve(damping)
+        yield chain.dx, damping, damping
+
+
+def _relaxed(damping: float) -> float:
+    """The damping after one that sufficed."""
+    return 0.0 if damping <= FIRST_DAMPING else damping / 10.0
+
+
+def _tried(chain: Chain, solver: Solver, x: Array, step: Array, merit: float, price: Array, gated: bool) -> tuple[float, bool]:
+    """The cost after a step from the states `x`, and whether the merit is good; the chain is left there."""
+    chain.x[:] = solver.moved(x, step)
+    new = chain.linearize()
+    judged, broken = chain.as_solved()
+    merit_new = _merit(judged, price, broken)
+    return new, isfinite(merit_new) and (not gated or _lower(chain, merit_new, merit))
 
 
 def _lower(chain: Chain, merit_new: float, merit: float) -> bool:
@@ -133,12 +199,12 @@ def _lower(chain: Chain, merit_new: float, merit: float) -> bool:
     return merit_new <= allowed or (merit_new <= allowed + 1e-3 * abs(merit) and merit_new <= allowed + chain.cost_rounding())
 
 
-def _merit(cost: float, multiplier: Array, broken: Array) -> float:
+def _merit(cost: float, price: Array, broken: Array) -> float:
     """The cost, and twice the price of the defects in directions without noise."""
     if not broken.any():
         return cost
     with np.errstate(all="ignore"):  # a step that is not finite has no merit
-        return cost + 2.0 * float((np.abs(multiplier) * broken).sum())
+        return cost + 2.0 * float((price * broken).sum())
 
 
 def _without_start(chain: Chain) -> Outcome:

@@ -190,6 +190,7 @@ def sentences(comparison: Comparison) -> list[str]:
     out = [f"{r.estimator} did not succeed: {r.message}." for r in comparison.rows if not r.success]
     wayward = dict.fromkeys(r.estimator for r in comparison.rows if r.success and r.diverged)
     out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down enough." for name in wayward]
+    out += dict.fromkeys(f"{r.estimator}: {r.message}." for r in comparison.rows if r.success and r.message)
     out += [*_rejected(comparison), *_modes(comparison)]
     if any(v is not None for r in sound for v in r.rmse.values()):
         out += [*_best(comparison, sound), *_honest(sound)]

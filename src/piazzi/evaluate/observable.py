@@ -238,7 +238,7 @@ def _about(problem: Problem, tracking: Tracking) -> tuple[Array, str, str]:
     estimate = FactorGraph().estimate(problem, tracking)
     if not np.isfinite(estimate.mean).all():
         raise ValueError(f"there is no truth, and the factor graph has no estimate to take its place: {estimate.message}")
-    return estimate.mean, "estimate", estimate.message
+    return estimate.mean, "estimate", "" if estimate.success else estimate.message
 
 
 def _observability(

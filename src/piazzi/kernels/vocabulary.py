@@ -92,6 +92,8 @@ backward: Any
 absorb_epoch: Any
 surprise: Any
 update_epoch_guarded: Any
+# written in fragments/graph_linearize.py
+weigh_dynamics: Any
 # written in fragments/*_lanes.py
 travel_lanes: Any
 transition_lanes: Any

@@ -98,7 +98,7 @@ def score_estimate(name: str, estimate: Estimate, groups: dict[str, tuple[int, .
         out.error[0] = np.stack([np.sqrt((part[:, list(c)] ** 2).sum(axis=1)) for c in groups.values()], axis=1)
         found = squared_in_sigmas(part, estimate.covariance[kept], ~np.isnan(truth[kept]))
         out.nees[0], out.rank[0] = found.value, found.rank
-    return out, row.message
+    return out, "" if row.success else row.message
 
 
 def _number(value: float | None) -> float:

@@ -36,6 +36,20 @@ def weigh(defect, scale, L, D, at, tether, y, broken, report, slot):
             broken[at + i] = fabs(y[i])
 
 
+@inline
+def weigh_dynamics(K, scale, Q, x, f, Q_all, tether, L, D, y, broken, report):
+    """The cost of all defects of the dynamics, into report[1], and those without noise, into `broken`."""
+    report[1] = 0.0
+    factor_noise(Q, L, D)
+    for j in range(1, K):
+        amount = scale[j]
+        if noise_varies():
+            factor_noise(noise_at(j, scale[j], Q, Q_all), L, D)
+            amount = 1.0
+        defect = load_vector(x, j * N, N) - load_vector(f, (j - 1) * N, N)
+        weigh(defect, amount, L, D, j * N, tether, y, broken, report, 1)
+
+
 @entry
 def graph_linearize(
     K: int,
@@ -64,20 +78,13 @@ def graph_linearize(
     report: Array,
 ) -> None:
     work, L, D, y = scratch(WORK), scratch(NN), scratch(N), scratch(N)
-    for i in range(4):
-        report[i] = 0.0
+    report[2] = 0.0
+    report[3] = 0.0
     linearize_dynamics(0, K, t, count, scale, p, Q_matrix(Q), x, f, Phi, Q_all)
     report[0] = linearize_rows(0, K, t, x, first_row, z, station, sensor, numbers, R, correlated, p, nu, H, work)
     factor_noise(load_matrix(P0, 0, N, N), L, D)
     weigh(load_vector(x, 0, N) - load_vector(m, 0, N), 1.0, L, D, 0, tether, y, broken, report, 2)
-    factor_noise(Q_matrix(Q), L, D)
-    for j in range(1, K):
-        amount = scale[j]
-        if noise_varies():
-            factor_noise(noise_at(j, scale[j], Q_matrix(Q), Q_all), L, D)
-            amount = 1.0
-        defect = load_vector(x, j * N, N) - load_vector(f, (j - 1) * N, N)
-        weigh(defect, amount, L, D, j * N, tether, y, broken, report, 1)
+    weigh_dynamics(K, scale, Q_matrix(Q), x, f, Q_all, tether, L, D, y, broken, report)
 
 
 @entry
