@@ -3,7 +3,8 @@
 import pytest
 
 import piazzi as pz
-from piazzi.estimate.registry import ESTIMATORS, parse, views_of
+from piazzi.estimate.estimator import views_of
+from piazzi.estimate.registry import ESTIMATORS, parse
 
 
 @pytest.mark.parametrize(
@@ -84,12 +85,24 @@ def test_what_means_nothing_is_refused_with_a_hint(text, message):
     assert "\n" not in str(caught.value)
 
 
+DELAYED = dict.fromkeys(("smoother", "batch", "graph"), "delayed")
+
+
 def test_every_name_can_be_built_and_knows_its_views():
-    for name, entry in ESTIMATORS.items():
+    for name in ESTIMATORS:
         estimator = parse(name)
         assert callable(estimator.estimate)
-        assert views_of(estimator) == entry.views
+        assert views_of(estimator) == {"window": ("realtime", "delayed")}.get(name, (DELAYED.get(name, "realtime"),))
 
 
-def test_an_estimator_of_somebody_else_is_taken_to_run_in_real_time():
+def test_an_estimator_of_somebody_else_is_taken_to_run_in_real_time_unless_it_says_otherwise():
     assert views_of(object()) == ("realtime",)
+
+    class Delayed:
+        views = ("delayed",)
+
+    class Shorter(pz.SlidingWindow):
+        pass
+
+    assert views_of(Delayed()) == ("delayed",)
+    assert views_of(Shorter()) == ("realtime", "delayed")

@@ -176,7 +176,7 @@ def test_the_failed_estimators_of_the_registry_have_all_their_views():
         def estimate(self, problem, tracking):
             raise RuntimeError("no")
 
-    Broken.__module__, Broken.__qualname__ = pz.FactorGraph.__module__, pz.FactorGraph.__qualname__
+    assert Broken.__module__ == __name__  # views come with the class, wherever it stands
     rows = compare(scenario.problem, tracking, {"graph": Broken()}).rows
     assert [(r.view, r.success) for r in rows] == [("delayed", False)]
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
 from piazzi.evaluate.metrics import errors, nees, nis, rmse
-from piazzi.study.lanes import Layout, filter_runs, in_lanes, semidefinite_root, simulate_runs
+from piazzi.study.lanes import Layout, filter_runs, semidefinite_root, simulate_runs
 from tests.laws.problems import b612, network, random_covariance, satellite
 
 RUNS, EPOCHS = 11, 40
@@ -156,8 +156,8 @@ def test_root_of_a_semidefinite_matrix(rank):
 
 
 def test_which_problems_fit_in_lanes():
-    assert in_lanes(satellite())
-    assert in_lanes(b612())
-    assert not in_lanes(satellite(method="integral"))
-    assert not in_lanes(satellite(pz.Kepler(), method="scaled"))
-    assert not in_lanes(satellite(manoeuvres=[pz.Manoeuvre(30.0, [1.0, 0.0])]))
+    assert satellite().runs_in_lanes
+    assert b612().runs_in_lanes
+    assert not satellite(method="integral").runs_in_lanes
+    assert not satellite(pz.Kepler(), method="scaled").runs_in_lanes
+    assert not satellite(manoeuvres=[pz.Manoeuvre(30.0, [1.0, 0.0])]).runs_in_lanes

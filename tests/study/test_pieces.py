@@ -116,7 +116,7 @@ def test_problems_that_need_more_than_lanes_are_the_same_study(change):
 def test_lanes_and_single_runs_are_the_same_truths(monkeypatch):
     study = small(problem=drawn_truth(), estimators=("ekf",))
     together = simulated(study, Task(0, 0, 9))
-    monkeypatch.setattr("piazzi.study.runs.in_lanes", lambda problem: False)
+    monkeypatch.setattr(pz.Problem, "runs_in_lanes", False)
     alone = simulated(study, Task(0, 0, 9))
     assert_allclose(alone.truth, together.truth, rtol=1e-11, atol=1e-11)
     assert_allclose(alone.z, together.z, rtol=1e-11, atol=1e-11)

@@ -48,8 +48,8 @@ def _warning_of_steps(found: Source, comparison: Comparison, estimators: Mapping
     starts from it) is asked for, else the first that gives states in real time, else the filter.
     """
     from piazzi.estimate import ExtendedKalmanFilter, FactorGraph
+    from piazzi.estimate.estimator import views_of
     from piazzi.estimate.long_steps import step_warning
-    from piazzi.estimate.registry import views_of
 
     truth = found.problem.truth
     if not found.recorded and (truth is None or truth.integrator is None):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain
 from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.determined import undetermined
-from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.estimator import Estimate, View
 from piazzi.estimate.factor_graph import FactorGraph
 from piazzi.estimate.gauss_newton import Outcome, optimize
 from piazzi.estimate.stopwatch import Stopwatch
@@ -67,6 +67,8 @@ class BatchLeastSquares:
     triangle, column by column in units of the prior (Bierman 1977).  Where the iterations do not converge from the prior,
     they are continued from the full graph of the same problem, which needs no good start; ``details["start"]`` tells.
     """
+
+    views: ClassVar[tuple[View, ...]] = ("delayed",)
 
     start: Any = None
     max_iterations: int = 50

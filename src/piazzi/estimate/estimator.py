@@ -22,10 +22,19 @@ View = Literal["realtime", "delayed"]
 
 
 class Estimator(Protocol):
-    """Frozen settings with one verb."""
+    """Frozen settings with one verb.
+
+    A class whose states are not (only) those of real time says so in a class variable, ``views = ("delayed",)``.
+    """
 
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Estimate the state at every epoch of the tracking."""
+
+
+def views_of(estimator: Any) -> tuple[View, ...]:
+    """The views of the states that an estimator gives: what its class says, else real time alone."""
+    views: tuple[View, ...] = getattr(type(estimator), "views", ("realtime",))
+    return views
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
 from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.determined import undetermined
-from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.estimator import Estimate, View
 from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.losses import Cauchy, loss_of
@@ -71,6 +71,8 @@ class FactorGraph:
     weighted measurements: they allow for rows that were weighted down, not for having chosen them by their residuals, and are
     some per cent off where noise is Gaussian or worse.
     """
+
+    views: ClassVar[tuple[View, ...]] = ("delayed",)
 
     start: Any = "ekf"
     max_iterations: int = 100

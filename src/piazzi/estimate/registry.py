@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, cast
 
-from piazzi.estimate.estimator import Estimator, View
+from piazzi.estimate.estimator import Estimator
 from piazzi.text import nearest
 
 GATE, ITERATIONS = 0.999, 5  # where the text gives no number
@@ -16,12 +16,11 @@ GATE, ITERATIONS = 0.999, 5  # where the text gives no number
 
 @dataclass(frozen=True)
 class Entry:
-    """One kind of estimator: how it is written, what it is, where its class is, and which views of the states it gives."""
+    """One kind of estimator: how it is written, what it is, and where its class is."""
 
     syntax: str
     summary: str
     place: str
-    views: tuple[View, ...]
     settings: Callable[[str], Mapping[str, Any]]
 
     def build(self, option: str) -> Estimator:
@@ -127,56 +126,48 @@ ESTIMATORS: Mapping[str, Entry] = {
         "ekf[:joint|:components][:gate[=P]]",
         "extended Kalman filter; gate=P leaves out rows that are worse than a share P of good ones",
         "piazzi.estimate.kalman:ExtendedKalmanFilter",
-        ("realtime",),
         _filter,
     ),
     "iekf": Entry(
         "iekf[:ITERATIONS][:gate[=P]]",
         "extended Kalman filter whose updates are iterated",
         "piazzi.estimate.kalman:ExtendedKalmanFilter",
-        ("realtime",),
         _iterated,
     ),
     "srekf": Entry(
         "srekf[:gate[=P]]",
         "extended Kalman filter in square-root form",
         "piazzi.estimate.square_root:SquareRootKalmanFilter",
-        ("realtime",),
         _gated,
     ),
     "ukf": Entry(
         "ukf[:gate[=P]]",
         "unscented Kalman filter: sigma points instead of Jacobians",
         "piazzi.estimate.unscented:UnscentedKalmanFilter",
-        ("realtime",),
         _gated,
     ),
     "smoother": Entry(
         "smoother",
         "fixed-interval smoother: the extended Kalman filter forward, and once back",
         "piazzi.estimate.smoother:Smoother",
-        ("delayed",),
         _plain,
     ),
     "batch": Entry(
         "batch",
         "batch least squares over the initial state, without process noise",
         "piazzi.estimate.batch:BatchLeastSquares",
-        ("delayed",),
         _plain,
     ),
     "graph": Entry(
         "graph[:ekf|:prior|:window|:bank[=N]][:LOSS[=K]]",
         "factor graph over all states, started from one of these; a LOSS (huber, cauchy, tukey) withstands outliers",
         "piazzi.estimate.factor_graph:FactorGraph",
-        ("delayed",),
         _graph,
     ),
     "window": Entry(
         "window:LAG[s][xITERATIONS][:LOSS[=K]]",
         "factor graph over the newest LAG states, or LAG seconds",
         "piazzi.estimate.sliding_window:SlidingWindow",
-        ("realtime", "delayed"),
         _window,
     ),
 }
@@ -199,9 +190,3 @@ def parse(text: str) -> Estimator:
         return ESTIMATORS[name].build(option)
     except ValueError as error:
         raise ValueError(f"estimator {text!r}: {error}") from None
-
-
-def views_of(estimator: Any) -> tuple[View, ...]:
-    """The views that an estimator of this class gives; realtime for one that is not in the table."""
-    place = f"{type(estimator).__module__}:{type(estimator).__qualname__}"
-    return next((entry.views for entry in ESTIMATORS.values() if entry.place == place), ("realtime",))

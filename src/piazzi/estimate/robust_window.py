@@ -11,10 +11,12 @@ from piazzi.problem.checks import Array
 
 
 def window_fragments(problem: Problem, loss: Loss | None, *last: str) -> tuple[str, ...]:
-    """Fragments of a sliding window; those for a loss come after those whose functions they replace."""
+    """Fragments of a sliding window; those for a loss stand in place of those whose functions they replace."""
+    parts = chain_fragments(problem)
     if loss is None:
-        return chain_fragments(problem, "window_step", *last)
-    return chain_fragments(problem, "epoch_guarded", "linearize_robust", "window_step", "window_step_robust", *last)
+        return (*parts, "window_prior", "window_step", *last)
+    rest = (name for name in parts if name != "linearize")
+    return (*rest, "epoch_guarded", "linearize_robust", "window_prior", "window_step_robust", *last)
 
 
 def row_space(problem: Problem, loss: Loss | None, rows: int) -> Array:

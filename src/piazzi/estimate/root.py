@@ -47,8 +47,7 @@ class RootKernel:
 
     def __init__(self, root: Root, problem: Problem) -> None:
         self.problem, n, m = problem, problem.model.n, problem.model.width
-        assert problem.integrator is not None
-        together = root.fragment == "root_unscented" and problem.integrator.in_lanes and not problem.manoeuvres
+        together = root.fragment == "root_unscented" and problem.moves_in_lanes
         parts = (
             "transition",
             problem.noise_fragment,

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.considered import with_considered
 from piazzi.estimate.determined import undetermined
-from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.estimator import Estimate, View
 from piazzi.estimate.live_window import LiveWindow, window_opens
 from piazzi.estimate.losses import loss_of
 from piazzi.estimate.robust_window import row_space, row_weights, window_fragments
@@ -49,6 +49,8 @@ class SlidingWindow:
     A direction that a wide prior left open, and that the measurements did not close, is named by the delayed estimate, which
     then is no success, as by the full graph.
     """
+
+    views: ClassVar[tuple[View, ...]] = ("realtime", "delayed")
 
     lag: int = 100
     iterations: int = 1

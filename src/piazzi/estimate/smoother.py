@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.chain import chain_fragments
 from piazzi.estimate.considered import with_considered
-from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.estimator import Estimate, View
 from piazzi.estimate.kalman import check_start
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.kernels.spec import lanes_for
@@ -33,6 +33,8 @@ class Smoother:
     covariance: process noise may be singular or zero.  The last state is the filter's.  Where the filter was far off, so is the
     linearisation; `FactorGraph` repeats it until nothing moves, and equals this smoother on linear problems.
     """
+
+    views: ClassVar[tuple[View, ...]] = ("delayed",)
 
     cross_covariances: bool = False
 

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from piazzi.estimate import Estimate, Estimator
-from piazzi.estimate.registry import views_of
+from piazzi.estimate.estimator import views_of
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
 from piazzi.evaluate.display import html, render
 from piazzi.evaluate.grids import as_text

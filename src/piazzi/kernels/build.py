@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 from pathlib import Path
 from types import ModuleType
@@ -29,6 +30,22 @@ def plain_entries(path: Path, names: tuple[str, ...]) -> dict[str, PlainEntry]:
 
 def compile_entries(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     """Object code of each entry, and its symbol with the kinds of its arguments."""
+    try:
+        return _compiled(path, names)
+    except Exception as error:
+        error.add_note(f"the source of the kernel that could not be compiled is kept in {_kept(path)}")
+        raise
+
+
+def _kept(path: Path) -> Path:
+    """A copy of a source beside the folder that it is built in, which goes."""
+    text = path.read_bytes()
+    copy = path.parent.parent / f"failed-{hashlib.sha256(text).hexdigest()[:16]}.py"
+    copy.write_bytes(text)
+    return copy
+
+
+def _compiled(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     with own_settings():
         from numba import types
 

@@ -48,13 +48,17 @@ class KernelSpec:
         return hashlib.sha256(repr((self, own, added, _surroundings())).encode()).hexdigest()[:32]
 
     def source(self, backend: str) -> str:
-        """The module's source for the "compiled" or the "plain" vocabulary."""
+        """The module's source for the "compiled" or the "plain" vocabulary; raises ValueError where its parts do not fit."""
         from piazzi.kernels.generate import model_source
+        from piazzi.kernels.names import check_names
 
         head = BANNER + f"from piazzi.kernels.{backend} import *\n\n\n"
-        body = "\n\n".join(_without_imports(_fragment(name)) for name in self.fragments)
-        text = model_source(self.model, self.scheme, self.lanes if backend == "compiled" else 1) + body
-        return head + _definitions(text) + text
+        model = model_source(self.model, self.scheme, self.lanes if backend == "compiled" else 1)
+        own = {name: _without_imports(_fragment(name)) for name in self.fragments}
+        text = model + "\n\n".join(own.values())
+        definitions = _definitions(text)
+        check_names({"functions": definitions, "model": model, **own})
+        return head + definitions + text
 
 
 @cache

@@ -19,7 +19,7 @@ def composed(problem: Problem, fragments: tuple[str, ...], lanes: int) -> tuple[
     assert integrator is not None
     events = "_manoeuvres" if problem.manoeuvres else ""
     axes = "axes_orbit" if problem.process_noise.axes == "orbit" else "axes"
-    together = integrator.in_lanes and not events and lanes > 1
+    together = problem.moves_in_lanes and lanes > 1
     linearize = "linearize_integral" if problem.noise_varies else "linearize_scaled" if together else "linearize_each"
     parts = {
         "transition": ("matrices", *integrator.fragments, f"transition{events}"),

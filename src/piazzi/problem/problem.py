@@ -306,6 +306,17 @@ class Problem:
         """Time of the prior of a run over these epochs, in seconds."""
         return float(times[0]) if self.prior_time is None else float(self.prior_time)
 
+    @property
+    def moves_in_lanes(self) -> bool:
+        """Whether several of its states can be carried over an interval together: the same operations for each of them."""
+        assert self.integrator is not None
+        return self.integrator.in_lanes and not self.manoeuvres
+
+    @property
+    def runs_in_lanes(self) -> bool:
+        """Whether whole runs can advance together: where states can, with process noise that does not depend on them."""
+        return self.moves_in_lanes and not self.noise_varies
+
     def intervals(self, times: Array) -> tuple[float, Array, Array]:
         """Time of the prior, and for each epoch the substeps and the noise scale of the interval that ends there."""
         assert self.integrator is not None

@@ -9,7 +9,7 @@ import numpy as np
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.simulation import true_problem
-from piazzi.study.lanes import Layout, compiles, filter_runs, in_lanes
+from piazzi.study.lanes import Layout, compiles, filter_runs
 from piazzi.study.plan import BOUND_RUNS, Study
 from piazzi.study.runs import Runs, simulated
 from piazzi.study.tasks import Task
@@ -82,7 +82,7 @@ def _add(mean: _Mean, first: int, study: Study, actual: Problem, runs: Runs, goo
     """Add the bounds of truths to a mean; of how many: all in lanes, `SLOW_RUNS` in all one by one."""
     layout = Layout(actual, study.times)
     sample = runs.z[good[:1]], runs.truth[good[:1]]
-    if good and view == "realtime" and in_lanes(actual) and compiles(filter_runs, layout, *sample):
+    if good and view == "realtime" and actual.runs_in_lanes and compiles(filter_runs, layout, *sample):
         _, _, scores = filter_runs(layout, runs.z[good], runs.truth[good], at_truth=True)
         assert scores is not None
         found = scores.spread.transpose(0, 2, 1)

@@ -97,12 +97,6 @@ class Scores:
     lowest: Array
 
 
-def in_lanes(problem: Problem) -> bool:
-    """Whether runs of this problem can advance together: the same operations in each, and process noise of one shape."""
-    assert problem.integrator is not None
-    return problem.integrator.in_lanes and not problem.noise_varies and not problem.manoeuvres
-
-
 def lane_count() -> int:
     """Runs that advance together: eight, so that where registers hold four, one waits for its roots while another works."""
     if not kernels.is_compiled():

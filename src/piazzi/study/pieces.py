@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from piazzi.estimate import ExtendedKalmanFilter
-from piazzi.estimate.registry import views_of
+from piazzi.estimate.estimator import views_of
 from piazzi.problem import Problem
 from piazzi.study.bound import bound_at, no_bound
-from piazzi.study.lanes import compiles, filter_runs, in_lanes
+from piazzi.study.lanes import compiles, filter_runs
 from piazzi.study.plan import Study
 from piazzi.study.runs import Runs, simulated
 from piazzi.study.score import NUMBERS, Scored, nothing, score_estimate, score_lanes
@@ -85,7 +85,7 @@ def _estimated(study: Study, label: str, estimator: Any, runs: Runs) -> list[tup
 
 def _filters_in_lanes(estimator: Any, belief: Problem) -> bool:
     plain = type(estimator) is ExtendedKalmanFilter and estimator.guard is None and estimator.update != "joint"
-    return plain and in_lanes(belief) and not belief.considered
+    return plain and belief.runs_in_lanes and not belief.considered
 
 
 def _filter(study: Study, runs: Runs, left: list[int], out: Scored) -> list[int]:

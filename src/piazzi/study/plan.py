@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.estimate import SlidingWindow
-from piazzi.estimate.estimator import View
-from piazzi.estimate.registry import parse, views_of
+from piazzi.estimate.estimator import View, views_of
+from piazzi.estimate.registry import parse
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.scenarios import load_scenario

@@ -11,7 +11,7 @@ from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.simulation import check_finite, propagate, true_problem
 from piazzi.study.draws import Draws, draw, why_refused
-from piazzi.study.lanes import Layout, compiles, in_lanes, simulate_runs
+from piazzi.study.lanes import Layout, compiles, simulate_runs
 from piazzi.study.plan import Study
 from piazzi.study.tasks import Task
 
@@ -46,7 +46,7 @@ def simulated(study: Study, task: Task) -> Runs:
     world, belief, actual, layout, believed = _at_point(study, task.point)
     draws = draw(world, actual, task.runs, study.seed, len(study.times))
     noisy = world.truth is None or world.truth.measurement_noise
-    if in_lanes(actual) and compiles(simulate_runs, layout, actual, draws.first[:1], draws.w[:1], draws.v[:1], noisy):
+    if actual.runs_in_lanes and compiles(simulate_runs, layout, actual, draws.first[:1], draws.w[:1], draws.v[:1], noisy):
         truth, z = simulate_runs(layout, actual, draws.first, draws.w, draws.v, noisy)
     else:
         truth, z = _one_by_one(world, actual, study.times, draws, noisy)
