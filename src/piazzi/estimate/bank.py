@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from piazzi.estimate.chain import Chain, Solver
-from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome
+from piazzi.estimate.gauss_newton import Outcome
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.robust import RobustChain, descend, gated_run, stand
+from piazzi.estimate.width import TOO_WIDE
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs

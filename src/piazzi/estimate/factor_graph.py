@@ -14,23 +14,21 @@ from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
 from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate, View
-from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome
+from piazzi.estimate.gauss_newton import Outcome
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.losses import Cauchy, loss_of
 from piazzi.estimate.robust import RobustChain, chain_for, descend, gated_run, stand
 from piazzi.estimate.sliding_window import SlidingWindow
 from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.estimate.width import DIFFUSE, RESTLESS, TOO_WIDE
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.inputs import Inputs, prepare, with_prior_node
 
 STARTS = ("ekf", "prior", "window", "bank")
 SOLVERS = ("auto", "chain", "bordered")
-# predicted over noise variance of one measurement beyond which a covariance keeps less than six digits of what is left
-DIFFUSE = 1e10
 # iterations that a second solution may take before the first is kept
 CHALLENGE = 20
-RESTLESS = "the bordered form does not apply, because process noise or a manoeuvre moves an estimated constant"
 
 
 @dataclass(frozen=True, eq=False)

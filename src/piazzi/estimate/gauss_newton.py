@@ -11,9 +11,9 @@ import numpy as np
 
 from piazzi.estimate.chain import DEFECT, GRADIENT, ROUNDING, STEP, STEP_SMOOTHED, Chain, Solver
 from piazzi.estimate.extrapolation import NEAR, Extrapolation
+from piazzi.estimate.width import TOO_WIDE
 from piazzi.problem.checks import Array
 
-TOO_WIDE = "the prior is too wide for covariances"
 FIRST_DAMPING, LARGEST_DAMPING = 1e-4, 1e12
 NEARLY, ROUGHLY = 3e-3, 10.0  # steps below so much of a sigma may be rounding, within so many times its estimate
 PARTS = (0.5, 0.25, 0.125)  # of a step near a solution, where the whole goes too far

@@ -16,6 +16,7 @@ from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.guarded import Guard, GuardedLiveFilter, check_gate, guarded_run
 from piazzi.estimate.live import LiveFilter
 from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.estimate.width import TOO_WIDE, too_wide
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
 from piazzi.problem.inputs import Inputs, prepare
@@ -49,6 +50,9 @@ class ExtendedKalmanFilter:
 
     Notes
     -----
+    Where a prior is 1e10 times as wide as the noise of a measurement, in variance, a covariance keeps less than six digits of
+    what is left: such runs are done again by `SquareRootKalmanFilter`, and ``details["solver"]`` says so.
+
     Jazwinski, Stochastic Processes and Filtering Theory (1970), ch. 8; covariance updates in Joseph form.  All measurements
     of one epoch are linearised once, at the predicted state (or, iterated, at the estimate so far).
 
@@ -86,15 +90,28 @@ class ExtendedKalmanFilter:
         inputs, guard = prepare(problem, tracking), self.guard
         if guard is None:
             mean, P, nu, S, seconds = filter_run(problem, inputs, self.update)
-            return Estimate(problem, tracking, mean, P, nu, S, len(mean), seconds)
+            if not too_wide(problem, S):
+                return Estimate(problem, tracking, mean, P, nu, S, len(mean), seconds)
+            return self._in_root_form(problem, tracking)
         watch = Stopwatch()
         mean, P, nu, S, rejected = guarded_run(problem, inputs, update_fragments(problem, self.update), guard)
         seconds = watch.seconds()
         check_start(problem, inputs, mean[0])
+        wide = too_wide(problem, S)
+        if wide and self.iterations == 1:
+            return self._in_root_form(problem, tracking)
         out = rejected.astype(bool)
         out.setflags(write=False)
         details = {} if self.gate is None else {"rejected": out, "rejected_count": int(out.sum())}
-        return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs * guard.iterations, seconds, details=details)
+        failure = f"{TOO_WIDE} beside the noise of the measurements: take one iteration per epoch" if wide else ""
+        steps = inputs.epochs * guard.iterations
+        return Estimate(problem, tracking, mean, P, nu, S, steps, seconds, details=details, failure=failure)
+
+    def _in_root_form(self, problem: Problem, tracking: Tracking) -> Estimate:
+        """The same filter with a square root of its covariance, for priors too wide for a covariance."""
+        from piazzi.estimate.root import linear_root, root_estimate
+
+        return root_estimate(linear_root(self.gate), problem, tracking, {"solver": "square root"})
 
     def start(self, problem: Problem) -> LiveFilter:
         """A filter that takes one measurement at a time, beginning at the prior."""

@@ -8,10 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from piazzi.estimate.chain import MEASUREMENT, PRIOR, Chain, Solver
-from piazzi.estimate.gauss_newton import TOO_WIDE, Outcome, optimize
+from piazzi.estimate.gauss_newton import Outcome, optimize
 from piazzi.estimate.guarded import Guard, guarded_run
 from piazzi.estimate.kalman import update_fragments
 from piazzi.estimate.losses import Huber, Loss
+from piazzi.estimate.width import TOO_WIDE
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -100,17 +102,27 @@ class RootKernel:
         return mean, P, nu, S, rejected
 
 
-def root_estimate(root: Root, problem: Problem, tracking: Tracking) -> Estimate:
-    """Filtered means and covariances at every epoch; raises ValueError where the tracking does not fit the problem."""
+def linear_root(gate: float | None = None) -> Root:
+    """The extended Kalman filter in square-root form."""
+    return Root("root_linear", 1, (), gate)
+
+
+def root_estimate(
+    root: Root, problem: Problem, tracking: Tracking, about: Mapping[str, Any] = MappingProxyType({})
+) -> Estimate:
+    """Filtered means and covariances at every epoch, with details `about` the way.
+
+    Raises ValueError where the tracking does not fit the problem.
+    """
     inputs = prepare(problem, tracking)
     kernel = root.kernel(problem)
     watch = Stopwatch()
     mean, P, nu, S, rejected = kernel.run(inputs, problem.mean, kernel.prior_root())
     seconds = watch.seconds()
     check_start(problem, inputs, mean[0])
-    details: dict[str, Any] = {}
+    details: dict[str, Any] = dict(about)
     if root.gate is not None:
         out = rejected.astype(bool)
         out.setflags(write=False)
-        details = {"rejected": out, "rejected_count": int(out.sum())}
+        details |= {"rejected": out, "rejected_count": int(out.sum())}
     return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs, seconds, details=details)

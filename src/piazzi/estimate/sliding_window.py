@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from piazzi import kernels
+from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.considered import with_considered
 from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate, View
@@ -15,10 +16,29 @@ from piazzi.estimate.live_window import LiveWindow, window_opens
 from piazzi.estimate.losses import loss_of
 from piazzi.estimate.robust_window import row_space, row_weights, window_fragments
 from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.estimate.width import RESTLESS, TOO_WIDE, last_wide, too_wide
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs, prepare
+
+LOSSY = "with a loss, narrow the prior"
+
+
+class WindowRun(NamedTuple):
+    """Arrays of a run, in the order of the kernel: states as they left the window, newest states, innovations."""
+
+    x: Array
+    P_delayed: Array
+    mean: Array
+    P: Array
+    nu: Array
+    S: Array
+
+
+def forward_of(estimate: Estimate) -> tuple[Array, ...]:
+    """Means, covariances, innovations and theirs of a filter."""
+    return estimate.mean, estimate.covariance, estimate.innovations, estimate.innovation_covariances
 
 
 @dataclass(frozen=True)
@@ -84,13 +104,30 @@ class SlidingWindow:
         """
         inputs = prepare(problem, tracking)
         begin = self.first_states(inputs.t)
-        library = kernels.load(problem.spec(*window_fragments(problem, self.loss, "window"), lanes=lanes_for(problem.model.n)))
-        K, N, M = inputs.epochs, problem.model.n, problem.model.width
-        J = len(inputs.z)
-        x, mean, P, P_delayed = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N)), np.empty((K, N, N))
-        nu, S = np.empty((J, M)), np.empty((J, M, M))
-        work = row_space(problem, self.loss, J)
+        work = row_space(problem, self.loss, len(inputs.z))
         watch = Stopwatch()
+        run, failure, solver = self._run(problem, inputs, begin, work, problem.mean, problem.covariance), "", "chain"
+        if too_wide(problem, run.S):
+            run, failure, solver = self._wide(problem, tracking, inputs, begin, run)
+        seconds = watch.seconds()
+        lag = self.lag if self.lag_seconds is None else None
+        details: dict[str, Any] = {"lag": lag, "lag_seconds": self.lag_seconds, "solver": solver}
+        if self.loss is not None:
+            details |= {"loss": str(self.loss), "weights": row_weights(work, len(inputs.z))}
+        steps = inputs.epochs * self.iterations
+        told = failure or undetermined(problem, run.P_delayed[0], run.x, run.P[-1])
+        late = Estimate(problem, tracking, run.x, run.P_delayed, run.nu, run.S, steps, seconds, "delayed", None, details, told)
+        return Estimate(problem, tracking, run.mean, run.P, run.nu, run.S, steps, seconds, "realtime", late, details, failure)
+
+    def _run(
+        self, problem: Problem, inputs: Inputs, begin: Array, work: Array, prior_mean: Array, prior_covariance: Array
+    ) -> WindowRun:
+        """The window over these epochs, begun at a prior."""
+        library = kernels.load(problem.spec(*window_fragments(problem, self.loss, "window"), lanes=lanes_for(problem.model.n)))
+        K, N, (J, M) = inputs.epochs, problem.model.n, inputs.z.shape
+        run = WindowRun(
+            *(np.empty(shape) for shape in ((K, N), (K, N, N), (K, N), (K, N, N), (J, M), (J, M, M))),
+        )
         library.run_window(
             K,
             begin,
@@ -102,25 +139,49 @@ class SlidingWindow:
             *inputs.measured(problem),
             problem.given,
             problem.process_noise.covariance,
-            problem.mean,
-            problem.covariance,
+            prior_mean,
+            prior_covariance,
             *window_space(problem, inputs, begin, work),
-            x,
-            P_delayed,
-            mean,
-            P,
-            nu,
-            S,
+            *run,
         )
-        seconds = watch.seconds()
-        lag = self.lag if self.lag_seconds is None else None
-        details: dict[str, Any] = {"lag": lag, "lag_seconds": self.lag_seconds, "solver": "chain"}
-        if self.loss is not None:
-            details |= {"loss": str(self.loss), "weights": row_weights(work, J)}
-        steps = K * self.iterations
-        told = undetermined(problem, P_delayed[0], x, P[-1])
-        late = Estimate(problem, tracking, x, P_delayed, nu, S, steps, seconds, "delayed", None, details, told)
-        return Estimate(problem, tracking, mean, P, nu, S, steps, seconds, "realtime", late, details)
+        return run
+
+    def _wide(
+        self, problem: Problem, tracking: Tracking, inputs: Inputs, begin: Array, run: WindowRun
+    ) -> tuple[WindowRun, str, str]:
+        """The run for a prior too wide for covariances, what cannot be had of it, and how it was solved.
+
+        Up to the last epoch that finds the state so open, the filter in square-root form, and states as they leave the window
+        beside the chain of the measurements until then; from there on the window, with the filter's belief as its prior.
+        """
+        from piazzi.estimate.diffuse import first_epochs, last_epochs, smoothed
+        from piazzi.estimate.root import linear_root, root_estimate
+
+        if self.loss is not None or not BorderedSolver.applies(problem):
+            why = LOSSY if self.loss is not None else RESTLESS
+            return run, f"{TOO_WIDE} beside the noise of the measurements: {why}", "chain"
+        forward = root_estimate(linear_root(), problem, tracking)
+        open_until = last_wide(problem, inputs, forward.innovation_covariances)
+        K, own = inputs.epochs, open_until + 1
+        whole = WindowRun(*(np.array(a) for a in (run.x, run.P_delayed, *forward_of(forward))))
+        if own < K:
+            rest = last_epochs(inputs, own)
+            later = self._run(
+                problem,
+                rest,
+                np.maximum(begin[own:] - own, 0),
+                row_space(problem, None, len(rest.z)),
+                np.array(forward.mean[open_until]),
+                np.array(forward.covariance[open_until]),
+            )
+            row = inputs.first_row[own]
+            for array, part, at in zip(whole, later, (own, own, own, own, row, row), strict=True):
+                array[at:] = part
+        for k in range(own):
+            until = int(np.searchsorted(begin, k, side="right"))
+            mean, covariance, _ = smoothed(problem, first_epochs(inputs, until), forward.mean[:until])
+            whole.x[k], whole.P_delayed[k] = mean[k], covariance[k]
+        return whole, "", "square root, then chain"
 
     def start(self, problem: Problem) -> LiveWindow:
         """A window that takes one measurement at a time, beginning at the prior."""

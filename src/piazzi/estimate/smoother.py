@@ -8,11 +8,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from piazzi import kernels
+from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import chain_fragments
 from piazzi.estimate.considered import with_considered
+from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate, View
 from piazzi.estimate.kalman import check_start
 from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.estimate.width import RESTLESS, TOO_WIDE, too_wide
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.inputs import prepare
@@ -84,5 +87,28 @@ class Smoother:
         first = slice(inputs.first_row[1])
         seen = ~np.isnan(inputs.z[first])
         check_start(problem, inputs, (nu[first] + np.diagonal(S[first], axis1=1, axis2=2))[seen])
+        if too_wide(problem, S):
+            return self._beside_the_chain(problem, tracking)
         details: dict[str, Any] = {"cross_covariances": cross[: K - 1]} if self.cross_covariances else {}
         return Estimate(problem, tracking, mean, covariance, nu, S, K, seconds, "delayed", details=details)
+
+    def _beside_the_chain(self, problem: Problem, tracking: Tracking) -> Estimate:
+        """The same for a prior too wide for covariances: along the square-root filter, the first state beside the chain."""
+        from piazzi.estimate.diffuse import smoothed
+        from piazzi.estimate.root import linear_root, root_estimate
+
+        inputs, watch = prepare(problem, tracking), Stopwatch()
+        forward = root_estimate(linear_root(), problem, tracking)
+        nu, S = forward.innovations, forward.innovation_covariances
+        details: dict[str, Any] = {"solver": "bordered"}
+        K = inputs.epochs
+        if not BorderedSolver.applies(problem):
+            failure = f"{TOO_WIDE} beside the noise of the measurements: {RESTLESS}"
+            return Estimate(
+                problem, tracking, forward.mean, forward.covariance, nu, S, K, watch.seconds(), "delayed", failure=failure
+            )
+        mean, covariance, cross = smoothed(problem, inputs, forward.mean)
+        if self.cross_covariances:
+            details["cross_covariances"] = cross
+        told = undetermined(problem, covariance[0], mean, covariance[-1])
+        return Estimate(problem, tracking, mean, covariance, nu, S, K, watch.seconds(), "delayed", None, details, told)

@@ -8,7 +8,7 @@ from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.guarded import check_gate
 from piazzi.estimate.live_root import LiveRootFilter
-from piazzi.estimate.root import Root, root_estimate
+from piazzi.estimate.root import Root, linear_root, root_estimate
 from piazzi.problem import Problem, Tracking
 
 
@@ -50,4 +50,4 @@ class SquareRootKalmanFilter:
 
     @property
     def _root(self) -> Root:
-        return Root("root_linear", 1, (), self.gate)
+        return linear_root(self.gate)

@@ -43,6 +43,7 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
         "WORK": model.width * (model.width + model.n),
         "NUMBERS": model.most_numbers,
         "GIVEN": max(len(model.given), 1),
+        "FEW_DIGITS": 1e8,
         "LOST": 1e-15 * max(model.n, 4),  # of a diagonal: what is left below it is rounding
     }
     parts = ["".join(f"{k} = {v}\n" for k, v in sizes.items()), "\n\n", _identity_source(model), axes_source(model)]

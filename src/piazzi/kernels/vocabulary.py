@@ -22,6 +22,7 @@ NUMBERS: int
 LANES: int
 GIVEN: int
 LOST: float
+FEW_DIGITS: float
 MAX_STEPS: int
 MAX_PANELS: int
 RTOL: float
@@ -86,6 +87,7 @@ record_epoch: Any
 retire: Any
 settle: Any
 forward_following: Any
+cancelled: Any
 Q_matrix: Any
 back_through_epoch: Any
 backward: Any

@@ -10,6 +10,7 @@ import numpy as np
 
 from piazzi.estimate import ExtendedKalmanFilter
 from piazzi.estimate.estimator import views_of
+from piazzi.estimate.width import DIFFUSE, prior_ratio
 from piazzi.problem import Problem
 from piazzi.study.bound import bound_at, no_bound
 from piazzi.study.lanes import compiles, filter_runs
@@ -85,7 +86,7 @@ def _estimated(study: Study, label: str, estimator: Any, runs: Runs) -> list[tup
 
 def _filters_in_lanes(estimator: Any, belief: Problem) -> bool:
     plain = type(estimator) is ExtendedKalmanFilter and estimator.guard is None and estimator.update != "joint"
-    return plain and belief.runs_in_lanes and not belief.considered
+    return plain and belief.runs_in_lanes and not belief.considered and prior_ratio(belief) <= DIFFUSE
 
 
 def _filter(study: Study, runs: Runs, left: list[int], out: Scored) -> list[int]:

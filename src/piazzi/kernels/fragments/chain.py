@@ -57,6 +57,19 @@ def follow_epoch(first, last, d, P, P_old, C, nu, H):
 
 
 @inline
+def cancelled(P_old, P_start):
+    """Whether what later measurements took from a covariance leaves few of its digits: they were subtracted, one by one."""
+    before, after = scratch(NN), scratch(NN)
+    store(before, 0, P_start)
+    store(after, 0, P_old)
+    lost = 0
+    for i in range(0, NN, N + 1):
+        if before[i] > FEW_DIGITS * after[i]:
+            lost = 1
+    return lost
+
+
+@inline
 def forward_following(a, W, x, scale, first_row, Q, Q_all, f, Phi, nu, H, m, P, d_pred, P_pred):
     """As `forward`, undamped; the covariance of the oldest state given all measurements of the stretch comes with it."""
     base = first_row[a]

@@ -76,5 +76,8 @@ def settle(
         backward(a, W, first_row, Phi, nu, H, 0.0, tether, d_pred, P_pred, gains, multiplier, dx)
         for j in range(W):
             store(x, (a + j) * N, load_vector(x, (a + j) * N, N) + load_vector(dx, j * N, N))
-        store(oldest_covariance, a * N * N, symmetric(P_old))
+        if cancelled(P_old, load_matrix(P_pred, 0, N, N)) == 1:
+            marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P_new, 0, oldest_covariance, tether)
+        else:
+            store(oldest_covariance, a * N * N, symmetric(P_old))
     return symmetric(P_new)

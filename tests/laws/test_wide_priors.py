@@ -1,0 +1,133 @@
+"""Priors up to 1e22 times as wide as the noise, in variance: every estimator against 100 digits, or it says that it cannot."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import piazzi as pz
+
+LINE = pz.Model(["x", "v"], ["x + dt*v", "v"], [pz.Sensor("r", ["x"])], discrete=True)
+K = 12
+
+
+def line(sx: float, sv: float, sr: float, dt: float, model: pz.Model = LINE) -> tuple[pz.Problem, pz.Tracking]:
+    """Constant velocity seen by its place, without process noise."""
+    rng = np.random.default_rng(0)
+    t = dt * np.arange(K)
+    x, v = np.array([sx, sv]) * rng.standard_normal(2)
+    problem = pz.Problem(model, pz.Gaussian.from_sigma([0, 0], [sx, sv]), None, [pz.Station("s", "r", sr**2)])
+    return problem, pz.Tracking(t, x + v * t + sr * rng.standard_normal(K))
+
+
+def exact(problem: pz.Problem, tracking: pz.Tracking, until: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and covariance of each state given the epochs up to `until[k]`: least squares in 100 digits."""
+    (sx, sv), sr = np.sqrt(np.diag(problem.covariance)), float(np.sqrt(problem.stations[0].noise[0, 0]))
+    means, covariances = [], []
+    with mp.workdps(100):
+        A, b = mp.diag([1 / mp.mpf(sx) ** 2, 1 / mp.mpf(sv) ** 2]), mp.matrix([0, 0])
+        first = []
+        for t, z in zip(tracking.times, tracking.values[:, 0], strict=True):
+            h = mp.matrix([1, mp.mpf(float(t))]) / mp.mpf(sr)
+            A, b = A + h * h.T, b + h * mp.mpf(float(z)) / mp.mpf(sr)
+            first.append((A**-1, A**-1 * b))
+        for t, k in zip(tracking.times, until, strict=True):
+            F = mp.matrix([[1, mp.mpf(float(t))], [0, 1]])
+            P, x = first[k]
+            means.append([float(v) for v in F * x])
+            covariances.append(np.array((F * P * F.T).tolist(), dtype=float))
+    return np.array(means), np.array(covariances)
+
+
+def off(estimate: pz.Estimate, truth: tuple[np.ndarray, np.ndarray]) -> tuple[float, float]:
+    """Largest errors of means, in sigma, and of sigmas, relative."""
+    mean, P = truth
+    sigma = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
+    rounding = 4e-16 * np.abs(mean) / sigma  # of the means themselves
+    found = np.sqrt(np.diagonal(estimate.covariance, axis1=1, axis2=2))
+    return float((np.abs(estimate.mean - mean) / sigma - rounding).max()), float(np.abs(found / sigma - 1).max())
+
+
+CASES = {
+    "1e8": (1e3, 1.0, 0.1, 60.0),
+    "1e16": (1e6, 1e3, 0.01, 60.0),
+    "1e20": (1e10, 1e10, 1.0, 1.0),
+    "1e22": (1e11, 1e11, 1.0, 1.0),
+    "wide in velocity": (1.0, 1e9, 1.0, 10.0),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.ExtendedKalmanFilter(gate=1 - 1e-12)], ids=["ekf", "gate"])
+def test_filters(case, estimator):
+    problem, tracking = line(*CASES[case])
+    estimate = estimator.estimate(problem, tracking)
+    assert estimate.success
+    mean, sigma = off(estimate, exact(problem, tracking, list(range(K))))
+    assert mean < 1e-4 and sigma < 1e-4
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("estimator", [pz.Smoother(), pz.FactorGraph()], ids=["smoother", "graph"])
+def test_smoothed_states(case, estimator):
+    problem, tracking = line(*CASES[case])
+    estimate = estimator.estimate(problem, tracking)
+    assert estimate.success
+    mean, sigma = off(estimate, exact(problem, tracking, [K - 1] * K))
+    assert mean < 1e-4 and sigma < 1e-6
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("lag", [1, 3, K])
+def test_windows_in_real_time_and_delayed(case, lag):
+    problem, tracking = line(*CASES[case])
+    estimate = pz.SlidingWindow(lag=lag).estimate(problem, tracking)
+    assert estimate.success and estimate.delayed.success, estimate.delayed.message
+    mean, sigma = off(estimate, exact(problem, tracking, list(range(K))))
+    assert mean < 1e-4 and sigma < 1e-4
+    mean, sigma = off(estimate.delayed, exact(problem, tracking, [min(k + lag - 1, K - 1) for k in range(K)]))
+    assert mean < 1e-4 and sigma < 1e-4
+
+
+@pytest.mark.parametrize("loss", [None, "huber"])
+def test_delayed_covariances_keep_their_digits_where_many_epochs_take_little_each(loss):
+    """No measurement stands 1e10 above its noise, yet velocity ends 1e12 below its prior, in variance."""
+    problem, tracking = line(1e3, 10.0, 1.0, 1e3)
+    lag = K - 2
+    delayed = pz.SlidingWindow(lag=lag, loss=loss).estimate(problem, tracking).delayed
+    assert delayed.success
+    truth = exact(problem, tracking, [min(k + lag - 1, K - 1) for k in range(K)])
+    if loss is None:
+        assert off(delayed, truth)[1] < 1e-6
+    else:  # weighted rows say a little less
+        ratio = np.sqrt(np.diagonal(delayed.covariance, axis1=1, axis2=2) / np.diagonal(truth[1], axis1=1, axis2=2))
+        assert ratio.min() > 0.999 and ratio.max() < 3
+
+
+def test_what_cannot_be_had_is_said():
+    problem, tracking = line(1e10, 1e10, 1.0, 1.0)
+    robust = pz.SlidingWindow(loss="huber").estimate(problem, tracking)
+    assert not robust.success and "the prior is too wide for covariances" in robust.message and "with a loss" in robust.message
+    iterated = pz.ExtendedKalmanFilter(iterations=3).estimate(problem, tracking)
+    assert not iterated.success and "take one iteration per epoch" in iterated.message
+
+
+def test_the_form_is_told():
+    problem, tracking = line(1e10, 1e10, 1.0, 1.0)
+    assert pz.ExtendedKalmanFilter().estimate(problem, tracking).details["solver"] == "square root"
+    assert pz.Smoother().estimate(problem, tracking).details["solver"] == "bordered"
+    assert pz.SlidingWindow().estimate(problem, tracking).details["solver"] == "square root, then chain"
+    problem, tracking = line(1e3, 1.0, 0.1, 60.0)
+    assert "solver" not in pz.ExtendedKalmanFilter().estimate(problem, tracking).details
+    assert pz.SlidingWindow().estimate(problem, tracking).details["solver"] == "chain"
+
+
+def test_studies_filter_wide_priors_one_by_one(tmp_path):
+    """Runs in vector lanes carry covariances: where those lose their digits, every run takes the form that keeps them."""
+    from piazzi.estimate.width import DIFFUSE, prior_ratio
+
+    wide, narrow = line(1e10, 1e10, 1.0, 1.0)[0], line(1e3, 1.0, 0.1, 60.0)[0]
+    assert prior_ratio(wide) == pytest.approx(1e20, rel=1e-3) and prior_ratio(narrow) == pytest.approx(1e8, rel=1e-3)
+    assert prior_ratio(narrow) < DIFFUSE
+    plan = pz.Study(wide, np.arange(float(K)), {"ekf": pz.ExtendedKalmanFilter()}, runs=40, seed=1)
+    line_of_ekf = plan.run(tmp_path / "wide.nc", workers=0).summary.lines[0]
+    assert line_of_ekf.mean_nees == pytest.approx(2.0, abs=0.6)  # of 2 values: a mean over 40 runs of 12 epochs
