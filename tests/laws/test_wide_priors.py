@@ -63,7 +63,7 @@ def test_filters(case, estimator):
     estimate = estimator.estimate(problem, tracking)
     assert estimate.success
     mean, sigma = off(estimate, exact(problem, tracking, list(range(K))))
-    assert mean < 1e-4 and sigma < 1e-4
+    assert mean < 1e-4 and sigma < (1e-5 if case == "1e22" else 1e-6)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -73,7 +73,7 @@ def test_smoothed_states(case, estimator):
     estimate = estimator.estimate(problem, tracking)
     assert estimate.success
     mean, sigma = off(estimate, exact(problem, tracking, [K - 1] * K))
-    assert mean < 1e-4 and sigma < 1e-6
+    assert mean < 1e-4 and sigma < (1e-5 if case == "1e22" else 1e-6)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -83,9 +83,9 @@ def test_windows_in_real_time_and_delayed(case, lag):
     estimate = pz.SlidingWindow(lag=lag).estimate(problem, tracking)
     assert estimate.success and estimate.delayed.success, estimate.delayed.message
     mean, sigma = off(estimate, exact(problem, tracking, list(range(K))))
-    assert mean < 1e-4 and sigma < 1e-4
+    assert mean < 1e-4 and sigma < (1e-5 if case == "1e22" else 1e-6)
     mean, sigma = off(estimate.delayed, exact(problem, tracking, [min(k + lag - 1, K - 1) for k in range(K)]))
-    assert mean < 1e-4 and sigma < 1e-4
+    assert mean < 1e-4 and sigma < (1e-5 if case == "1e22" else 1e-6)
 
 
 @pytest.mark.parametrize("loss", [None, "huber"])

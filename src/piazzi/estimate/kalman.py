@@ -90,14 +90,14 @@ class ExtendedKalmanFilter:
         inputs, guard = prepare(problem, tracking), self.guard
         if guard is None:
             mean, P, nu, S, seconds = filter_run(problem, inputs, self.update)
-            if not too_wide(problem, S):
+            if not too_wide(problem, inputs, S):
                 return Estimate(problem, tracking, mean, P, nu, S, len(mean), seconds)
             return self._in_root_form(problem, tracking)
         watch = Stopwatch()
         mean, P, nu, S, rejected = guarded_run(problem, inputs, update_fragments(problem, self.update), guard)
         seconds = watch.seconds()
         check_start(problem, inputs, mean[0])
-        wide = too_wide(problem, S)
+        wide = too_wide(problem, inputs, S)
         if wide and self.iterations == 1:
             return self._in_root_form(problem, tracking)
         out = rejected.astype(bool)

@@ -107,7 +107,7 @@ class SlidingWindow:
         work = row_space(problem, self.loss, len(inputs.z))
         watch = Stopwatch()
         run, failure, solver = self._run(problem, inputs, begin, work, problem.mean, problem.covariance), "", "chain"
-        if too_wide(problem, run.S):
+        if too_wide(problem, inputs, run.S):
             run, failure, solver = self._wide(problem, tracking, inputs, begin, run)
         seconds = watch.seconds()
         lag = self.lag if self.lag_seconds is None else None
@@ -162,6 +162,8 @@ class SlidingWindow:
             return run, f"{TOO_WIDE} beside the noise of the measurements: {why}", "chain"
         forward = root_estimate(linear_root(), problem, tracking)
         open_until = last_wide(problem, inputs, forward.innovation_covariances)
+        if open_until < 0:  # only to the last digits of a covariance
+            return run, "", "chain"
         K, own = inputs.epochs, open_until + 1
         whole = WindowRun(*(np.array(a) for a in (run.x, run.P_delayed, *forward_of(forward))))
         if own < K:

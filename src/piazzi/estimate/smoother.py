@@ -87,7 +87,7 @@ class Smoother:
         first = slice(inputs.first_row[1])
         seen = ~np.isnan(inputs.z[first])
         check_start(problem, inputs, (nu[first] + np.diagonal(S[first], axis1=1, axis2=2))[seen])
-        if too_wide(problem, S):
+        if too_wide(problem, inputs, S):
             return self._beside_the_chain(problem, tracking)
         details: dict[str, Any] = {"cross_covariances": cross[: K - 1]} if self.cross_covariances else {}
         return Estimate(problem, tracking, mean, covariance, nu, S, K, seconds, "delayed", details=details)

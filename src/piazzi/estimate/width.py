@@ -21,26 +21,24 @@ TOO_WIDE = "the prior is too wide for covariances"
 RESTLESS = "the bordered form does not apply, because process noise or a manoeuvre moves an estimated constant"
 
 
-def too_wide(problem: Problem, S: Array) -> bool:
+def too_wide(problem: Problem, inputs: Inputs, S: Array) -> bool:
     """Whether innovation covariances (J, m, m) of a filter stand further above the noise than covariances can tell."""
     least = np.diagonal(problem.station_noise, axis1=1, axis2=2)
     if S.size and np.fmax.reduce(S, axis=None) <= DIFFUSE * least[least > 0.0].min():  # an upper bound, which costs little
         return False
-    return bool((ratios(problem, S) > DIFFUSE).any())
+    return bool((ratios(problem, inputs, S) > DIFFUSE).any())
 
 
-def ratios(problem: Problem, S: Array, station: Array | None = None) -> Array:
-    """Largest S / R of each row, (J,); where `station` is not given, with the least noise that any station has."""
-    R = np.diagonal(problem.station_noise, axis1=1, axis2=2)
-    R = np.where(R > 0.0, R, np.inf)
-    R = R.min(axis=0) if station is None else R[station]
+def ratios(problem: Problem, inputs: Inputs, S: Array) -> Array:
+    """Largest S / R of each row, (J,)."""
+    R = np.diagonal(problem.station_noise, axis1=1, axis2=2)[inputs.station]
     with np.errstate(all="ignore"):
         return np.asarray(np.fmax.reduce(np.diagonal(S, axis1=1, axis2=2) / R, axis=1, initial=0.0))
 
 
 def last_wide(problem: Problem, inputs: Inputs, S: Array) -> int:
     """The last epoch with a row that is too wide, -1 where there is none."""
-    rows = np.flatnonzero(ratios(problem, S, inputs.station) > DIFFUSE)
+    rows = np.flatnonzero(ratios(problem, inputs, S) > DIFFUSE)
     return int(np.searchsorted(inputs.first_row, rows[-1], side="right")) - 1 if rows.size else -1
 
 

@@ -61,7 +61,11 @@ def whiten_root(nu, G, R, at, L):
 
 @inline
 def absorb_root(nu, G, at, B, d, phi):
-    """Correction `d` and joint root `B` after one component of unit noise: B' = B - B phi phi^T / (S + sqrt(S))."""
+    """Correction `d` and joint root `B` after one component of unit noise: B' = B - B phi phi^T / (S + sqrt(S)).
+
+    Where the component is far more exact than what was known, the difference loses its digits: then one column of B after the
+    other by rotations (Carlson, AIAA Journal 11, 1973).
+    """
     S = 1.0
     e = nu
     for j in range(unknowns()):
@@ -77,8 +81,18 @@ def absorb_root(nu, G, at, B, d, phi):
             s += B[i * unknowns() + j] * phi[j]
         d[i] += s * (e / S)
         s = s / (S + sqrt(S))
-        for j in range(unknowns()):
-            B[i * unknowns() + j] -= s * phi[j]
+        if S < FEW_DIGITS:
+            for j in range(unknowns()):
+                B[i * unknowns() + j] -= s * phi[j]
+        else:
+            before = 1.0
+            s = 0.0
+            for j in range(unknowns()):
+                after = before + phi[j] * phi[j]
+                b = B[i * unknowns() + j]
+                B[i * unknowns() + j] = (before * b - s * phi[j]) / sqrt(before * after)
+                s += b * phi[j]
+                before = after
 
 
 @inline
