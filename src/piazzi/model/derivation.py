@@ -159,7 +159,7 @@ def jacobian(f: sp.Matrix, x: Sequence[sp.Symbol]) -> sp.Matrix:
     entries: list[sp.Expr] = []
     for i in range(f.rows):
         try:
-            entries += patiently(partial(row, i))
+            entries.extend(patiently(partial(row, i)))  # += asks the matrix of SymPy 1.13, which refuses
         except TooSlowError as error:
             raise ValueError(f"derivatives of equation {i + 1}: {error}") from None
     return sp.Matrix(f.rows, len(x), entries)
