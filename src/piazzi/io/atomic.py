@@ -28,15 +28,27 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path if special else os.path.realpath(path))
     work = _temporary(target) if special else _beside(target)
     try:
-        yield work
-        if special:
-            with open(work, "rb") as source, open(target, "wb") as sink:
-                shutil.copyfileobj(source, sink)
-        else:
-            _settle(work, target)
+        with _told(path, work):
+            yield work
+            if special:
+                with open(work, "rb") as source, open(target, "wb") as sink:
+                    shutil.copyfileobj(source, sink)
+            else:
+                _settle(work, target)
     finally:
         with suppress(FileNotFoundError):
             work.unlink()
+
+
+@contextmanager
+def _told(path: str | os.PathLike[str], work: Path) -> Iterator[None]:
+    """What the system refuses of the temporary file, with the name that was asked for."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is None or error.filename not in (None, work, os.fspath(work)):
+            raise
+        raise OSError(error.errno, error.strerror, os.fspath(path)) from error
 
 
 def sweep(path: str | os.PathLike[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.io.atomic import atomic_path, check_writable
 from piazzi.problem.checks import Array
 from piazzi.sources import opened as opened_file
 from piazzi.text import one_line
@@ -20,6 +22,22 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 FREE_BYTES = 64 * 2**20
 EXPANSION = 20
 _DAMAGE = (OSError, KeyError, RuntimeError, TypeError, OverflowError, MemoryError, AttributeError, IndexError, ArithmeticError)
+
+
+@contextmanager
+def written(path: str | os.PathLike[str]) -> Iterator[Any]:
+    """An h5netcdf file that appears at `path` when the block ends well, whole or not at all.
+
+    It is made in memory: HDF5 does not survive a disk that is full, and takes the process along.  Raises OSError.
+    """
+    import h5netcdf
+
+    check_writable(path)
+    content = io.BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        yield file
+    with atomic_path(path) as work, open(work, "wb") as sink:
+        sink.write(content.getbuffer())
 
 
 @contextmanager

@@ -18,7 +18,6 @@ from piazzi.estimate import Estimate
 from piazzi.estimate.dataset import DETAIL, estimate_to_dataset, plain_details, tracking_to_dataset
 from piazzi.estimate.estimator import View
 from piazzi.io import hdf5
-from piazzi.io.atomic import atomic_path
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.scenarios.faults import Faults, shown
@@ -96,12 +95,13 @@ def _with_json(dataset: xarray.Dataset, **documents: Mapping[str, Any]) -> xarra
 
 
 def _write(path: str | os.PathLike[str], groups: Mapping[str, xarray.Dataset]) -> None:
-    with atomic_path(path) as work:
+    from xarray.backends import H5NetCDFStore
+
+    with hdf5.written(path) as file:
         for group, dataset in groups.items():
             # no fill values: NaN already says what is missing, and integers have none missing
             encoding = {name: {"_FillValue": None, **variable.encoding} for name, variable in dataset.variables.items()}
-            mode: Any = "w" if group == "/" else "a"
-            dataset.to_netcdf(work, mode=mode, group=group, engine="h5netcdf", encoding=encoding)
+            dataset.dump_to_store(H5NetCDFStore(file, group=group, mode="a"), encoding=encoding)
 
 
 # ---- reading -----------------------------------------------------------------------------------------------------------

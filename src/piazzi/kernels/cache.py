@@ -123,7 +123,10 @@ def _build(spec: KernelSpec, place: Folder | None, digest: str) -> dict[str, Any
         path.write_text(source)
         objects, symbols = compile_entries(path, entry_names(source))
     if place is not None and may_be_kept():
-        _keep(place, digest, source, objects, symbols)
+        try:
+            _keep(place, digest, source, objects, symbols)
+        except OSError as error:  # a full disk: the code is here, and is made again next time
+            LOGGER.info("kernels are not kept in %s: %s", place.path, error.strerror or error)
     return dict(load_objects(objects, symbols))
 
 

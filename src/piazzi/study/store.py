@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.io import hdf5
-from piazzi.io.atomic import atomic_path
 from piazzi.problem.checks import Array
 from piazzi.study.log import Log
 from piazzi.study.plan import SCHEMA, Study
@@ -99,12 +98,10 @@ class Stored:
 
 def write_store(path: str | os.PathLike[str], study: Study, log: Log) -> None:
     """Write the finished study of a log, whole or not at all; raises OSError."""
-    import h5netcdf
-
     messages: list[list[Any]] = []
     unknown: list[list[Any]] = []
     lost = 0
-    with atomic_path(path) as work, h5netcdf.File(work, "w") as file:
+    with hdf5.written(path) as file:
         _create(file, study)
         for piece in _together(log.pieces()):
             task = piece.task
