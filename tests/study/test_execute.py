@@ -285,6 +285,7 @@ def _alive(pid):
         return False
 
 
+@pytest.mark.filterwarnings("default:.*record damaged:UserWarning")
 @pytest.mark.parametrize(
     "task", [(0, int(8e100), 4), (0, 0, 10**30), (7, 0, 4), (0, 58, 4), (0, -4, 4), (0.0, 0, 4), ("0", 0, 4)]
 )

@@ -81,6 +81,7 @@ def test_a_flipped_bit_is_found(path):
     log.close()
 
 
+@pytest.mark.filterwarnings("default:.*record damaged:UserWarning")
 def test_damage_in_the_middle_costs_the_runs_that_were_there_only(path):
     log = Log.open(path)
     middle = log.entries[1].offset
@@ -215,3 +216,62 @@ def test_a_record_full_of_holes_is_looked_at_in_parts(path):
     assert [entry.task.first for entry in log.entries] == [0, 3, 6, 9]
     log.close()
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 2**18  # KiB
+
+
+def resealed(path, change):
+    """The log with the contents of its second record changed, and its sums right again."""
+    from piazzi.study.log import _read, _record
+
+    with open(path, "rb") as file:
+        assert _read(file) is not None
+        head_end = file.tell()
+        header, body = _read(file)
+        rest = file.read()
+    start = path.read_bytes()[:head_end]
+    path.write_bytes(start + _record(*change(header, body)) + rest)
+
+
+CHANGES = {
+    "no task": lambda h, b: ({"tsk": [0, 0, 1]}, b),
+    "list": lambda h, b: ([1, 2], b),
+    "arrays": lambda h, b: (h | {"arrays": [["rmse"]]}, b),
+    "kind": lambda h, b: (h | {"arrays": [[n, "O", s] for n, _, s in h["arrays"]]}, b),
+    "messages": lambda h, b: (h | {"messages": ["x"]}, b),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=list(CHANGES))
+def test_records_with_right_sums_and_wrong_contents_are_damage(path, change):
+    resealed(path, change)
+    with pytest.warns(UserWarning, match="1 record damaged; 6 runs are whole"):
+        again = Log.open(path)
+    assert len(again.entries) == 2
+    again.close()
+    assert path.with_name(path.name + ".damaged").exists()
+
+
+def test_a_body_of_another_size_is_refused_with_its_place(path):
+    resealed(path, lambda h, b: (h, b[:-8]))
+    again = Log.open(path)
+    with pytest.raises(ValueError, match=rf"{path}, byte \d+: a record declares arrays of \d+ bytes and holds \d+"):
+        list(again.pieces())
+    again.close()
+
+
+def test_a_flipped_bit_loses_at_most_the_record_that_it_hits(path):
+    log = Log.open(path)
+    offsets = [entry.offset for entry in log.entries]
+    log.close()
+    whole = path.read_bytes()
+    for at in [offsets[1] + k for k in (0, 7, 8, 12, 15, 20, 47, 50, 60)]:
+        damaged = bytearray(whole)
+        damaged[at] ^= 0x10
+        path.write_bytes(damaged)
+        with pytest.warns(UserWarning, match="1 record damaged"):
+            again = Log.open(path)
+        left = [entry.task.first for entry in again.entries]
+        again.close()
+        assert left == [0, 6], at - offsets[1]
+        copy = path.with_name(path.name + ".damaged")
+        assert copy.read_bytes() == bytes(damaged)
+        copy.unlink()

@@ -164,5 +164,5 @@ def test_absurd_shapes_are_refused_before_memory_is_asked_for(stored, tmp_path):
             else:
                 file.create_dataset(name, data=data[()])
     assert small_file.stat().st_size < 100_000
-    with pytest.raises(ValueError, match=r"bomb.nc: variable '\w+' would take [\d,]+ bytes, absurd"):
+    with pytest.raises(ValueError, match=r"bomb.nc: variable '\w+' (would take|has shape)"):
         read_store(small_file).summary.lines  # noqa: B018

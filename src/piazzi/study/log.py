@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
+import shutil
 import stat
 import struct
+import warnings
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,8 +18,10 @@ from typing import IO, Any
 
 import numpy as np
 
+from piazzi.study.schema import check_body, check_record
 from piazzi.study.tasks import Piece, Task
 
+LOGGER = logging.getLogger("piazzi.study")
 ENDING = ".runs"
 _MAGIC = b"PZRUNS1\n"
 _HEAD = struct.Struct("<8sQ32s")  # magic, length of what follows, its SHA-256
@@ -70,19 +75,28 @@ class Log:
     @classmethod
     def _scan(cls, path: Path, file: IO[bytes]) -> Log:
         first = _read(file)
-        if first is None or "specification" not in first[0]:
+        if first is None or not isinstance(first[0].get("specification"), dict):
             raise ValueError(f"{path}: no runs of a study are in this file")
-        entries, end = [], file.tell()
+        entries, end, damaged = list[Entry](), file.tell(), 0
         while True:
             found = _read(file, body=False)
             if found is None:
                 behind = _behind(file, end)
                 if behind is None:
                     break
+                damaged += 1
                 end = file.seek(behind)  # its runs are missing, so they are computed again
+                continue
+            try:
+                check_record(found[0])
+            except ValueError as error:
+                LOGGER.debug("%s, byte %d: %s", path, end, error)
+                damaged, end = damaged + 1, file.tell()
                 continue
             entries.append(Entry(Task(*found[0]["task"]), end))
             end = file.tell()
+        if damaged:
+            _keep_copy(path, damaged, sum(entry.task.count for entry in entries))
         if os.fstat(file.fileno()).st_size > end:
             file.truncate(end)
         return cls(path, file, first[0]["specification"], entries)
@@ -105,6 +119,10 @@ class Log:
         found = _read(self._file)
         if found is None:
             raise ValueError(f"{self.path}: the runs at byte {entry.offset} were damaged")
+        try:
+            check_body(*found)
+        except ValueError as error:
+            raise ValueError(f"{self.path}, byte {entry.offset}: {error}") from None
         return _unpacked(*found)
 
     def pieces(self) -> Iterator[Piece]:
@@ -164,21 +182,44 @@ def _read(file: IO[bytes], body: bool = True) -> tuple[dict[str, Any], bytes] | 
         checksum.update(part)
         left -= len(part)
         parts += [part] * body
-    return (json.loads(text), b"".join(parts)) if checksum.digest() == digest else None
+    if checksum.digest() != digest:
+        return None
+    try:
+        header = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return (header if isinstance(header, dict) else {}), b"".join(parts)
 
 
 def _behind(file: IO[bytes], start: int) -> int | None:
-    """Where the record after a damaged one at `start` begins; None where there is none."""
-    file.seek(start)
-    head = file.read(_HEAD.size)
-    if len(head) < _HEAD.size:
-        return None
-    magic, length, _ = _HEAD.unpack(head)
-    behind = start + _HEAD.size + int(length)
-    if magic != _MAGIC or not 8 <= length <= _LONGEST or behind + _HEAD.size > os.fstat(file.fileno()).st_size:
-        return None
-    file.seek(behind)
-    return behind if _HEAD.unpack(file.read(_HEAD.size))[0] == _MAGIC else None
+    """Where the next whole record after a damaged one at `start` begins; None where there is none.
+
+    What is damaged may be its length, so the next one is looked for by its first bytes.
+    """
+    at = start + 1
+    while True:
+        file.seek(at)
+        window = file.read(_PART + len(_MAGIC))
+        found = window.find(_MAGIC)
+        if found < 0:
+            if len(window) <= _PART:
+                return None
+            at += _PART
+            continue
+        file.seek(at + found)
+        if _read(file, body=False) is not None:
+            return file.seek(at + found)
+        at += found + 1
+
+
+def _keep_copy(path: Path, damaged: int, kept: int) -> None:
+    """A copy of a damaged file beside it, before its runs are computed again, and a line that says so."""
+    copy = path.with_name(path.name + ".damaged")
+    with suppress(OSError):
+        shutil.copyfile(path, copy)
+    records = f"{damaged} record{'s' * (damaged > 1)}"
+    text = f"{path}: {records} damaged; {kept} runs are whole, the others are computed again (copy: {copy.name})"
+    warnings.warn(text, stacklevel=2)
 
 
 def _packed(piece: Piece) -> bytes:

@@ -16,6 +16,7 @@ from piazzi.io import hdf5
 from piazzi.problem.checks import Array
 from piazzi.study.log import Log
 from piazzi.study.plan import SCHEMA, Study
+from piazzi.study.schema import check_about, check_arrays
 from piazzi.study.score import NUMBERS
 from piazzi.study.tasks import Piece, Task
 
@@ -105,18 +106,35 @@ def write_store(path: str | os.PathLike[str], study: Study, log: Log) -> None:
         _create(file, study)
         for piece in _together(log.pieces()):
             task = piece.task
+            runs = (slice(None), slice(task.first, task.first + task.count)) if task.count else ()
+            _check_piece(file, log, piece, runs)
+            for name, values in piece.arrays.items():
+                file.variables[name][(task.point, *runs)] = values
             if not task.count:
-                for name, values in piece.arrays.items():
-                    file.variables[name][task.point] = values
                 unknown += [[task.point, text] for *_, text in piece.messages]
                 continue
-            for name, values in piece.arrays.items():
-                file.variables[name][task.point, :, task.first : task.first + task.count] = values
             room = MOST_MESSAGES - len(messages)
             messages += [[task.point, row, run, text] for row, run, text in piece.messages[:room]]
             lost += max(0, len(piece.messages) - room)
         told = {"messages": sorted(messages), "messages_left_out": lost, "bounds_unknown": unknown}
         _write_text(file, "about", {**_about(study), **told})
+
+
+def _check_piece(file: Any, log: Log, piece: Piece, runs: tuple[slice, ...]) -> None:
+    """Raise ValueError where a piece does not hold what the study keeps of such runs."""
+    task = piece.task
+    wanted = {n for n, v in file.variables.items() if v.dimensions[:1] == ("point",) and ("run" in v.dimensions) == bool(runs)}
+    if piece.arrays.keys() != wanted:
+        different = sorted(piece.arrays.keys() ^ wanted)[0]
+        raise ValueError(
+            f"{log.path}: point {task.point}, runs from {task.first}: {different!r} is missing, or not of this study"
+        )
+    for name, values in piece.arrays.items():
+        shape = file.variables[name].shape[1:]
+        shape = (shape[0], task.count, *shape[2:]) if runs else shape
+        if shape != values.shape:
+            text = f"{name!r} has shape {values.shape}, not {shape}"
+            raise ValueError(f"{log.path}: point {task.point}, runs from {task.first}: {text}")
 
 
 def _together(pieces: Iterable[Piece]) -> Iterator[Piece]:
@@ -133,6 +151,8 @@ def _together(pieces: Iterable[Piece]) -> Iterator[Piece]:
 
 def _goes_with(piece: Piece, before: Sequence[Piece]) -> bool:
     last, size = before[-1].task, sum(a.nbytes for p in (*before, piece) for a in p.arrays.values())
+    if piece.arrays.keys() != before[-1].arrays.keys():
+        return False
     next_to = (piece.task.point, piece.task.first) == (last.point, last.first + last.count)
     return next_to and piece.task.count > 0 and last.count > 0 and size <= _WRITTEN_TOGETHER
 
@@ -154,7 +174,10 @@ def read_store(path: str | os.PathLike[str]) -> Stored:
         if about.get("schema") != SCHEMA:
             raise ValueError("it holds no study")
         times = hdf5.array(root, "time")
-        assert times is not None
+        if times is None or times.ndim != 1:
+            raise ValueError("it has no times")
+        check_about(about)
+        check_arrays(root, about)
         return Stored(Path(path), about, times)
 
 
