@@ -138,3 +138,16 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_utime < 10)
     )
     assert "SymPy needs more than 5 s for this" in done.stdout
     assert done.stdout.endswith("True\n")
+
+
+def test_a_profiler_can_watch_what_comes_after_a_limit():
+    """CPython 3.11 with a profiler stood still at the next generator, looking for an interruption that never came."""
+    program = """
+import sys
+from piazzi.expressions.patience import patiently
+sys.setprofile(lambda *event: None)
+patiently(lambda: None)
+print(sum(i for i in range(3)))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert done.stdout == "3\n"

@@ -45,7 +45,7 @@ class _Watch:
     def __init__(self, seconds: float) -> None:
         # no Exception, because SymPy catches those; one of its own, so that of nested limits each ends its own block
         self.interruption: type[BaseException] = type("Interruption", (BaseException,), {})
-        self.seconds = seconds
+        self.seconds, self._sent = seconds, False
         self._thread, self._used = threading.get_ident(), _clock()
         self._lock, self._stopped = threading.Lock(), threading.Event()
         threading.Thread(target=self._run, daemon=True).start()
@@ -54,7 +54,8 @@ class _Watch:
         """End; nothing is interrupted any more when this has returned."""
         with self._lock:
             self._stopped.set()
-        _interrupt(self._thread, None)
+        if self._sent:  # taking back what was never sent would leave CPython looking for it at every step, profilers for ever
+            _interrupt(self._thread, None)
 
     def _run(self) -> None:
         start, wait = self._used(), self.seconds
@@ -63,6 +64,7 @@ class _Watch:
             if wait == _AGAIN:
                 with self._lock:
                     if not self._stopped.is_set():
+                        self._sent = True
                         _interrupt(self._thread, self.interruption)
 
 
