@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib.util
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from piazzi.kernels.library import INTEGER, POINTER, REAL, PlainEntry
+from piazzi.kernels.library import INTEGER, POINTER, REAL, Entry, PlainEntry
 from piazzi.kernels.settings import own_settings
 
 
@@ -30,33 +29,31 @@ def plain_entries(path: Path, names: tuple[str, ...]) -> dict[str, PlainEntry]:
 
 def compile_entries(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     """Object code of each entry, and its symbol with the kinds of its arguments."""
-    try:
-        return _compiled(path, names)
-    except Exception as error:
-        error.add_note(f"the source of the kernel that could not be compiled is kept in {_kept(path)}")
-        raise
-
-
-def _kept(path: Path) -> Path:
-    """A copy of a source beside the folder that it is built in, which goes."""
-    text = path.read_bytes()
-    copy = path.parent.parent / f"failed-{hashlib.sha256(text).hexdigest()[:16]}.py"
-    copy.write_bytes(text)
-    return copy
-
-
-def _compiled(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     with own_settings():
-        from numba import types
+        from piazzi.kernels.compiler import object_code
 
         module = import_file(path)
-        kinds = {types.int64: INTEGER, types.float64: REAL}
-        objects, symbols = {}, {}
-        for name in names:
-            callback: Any = getattr(module, name)
-            objects[name] = callback._library.object_code()
-            symbols[name] = (callback.native_name, tuple(kinds.get(a, POINTER) for a in callback._sig.args))
+        callbacks = {name: getattr(module, name) for name in names}
+        objects = {name: object_code(callback) for name, callback in callbacks.items()}
+        symbols = {name: (callback.native_name, _kinds(callback)) for name, callback in callbacks.items()}
     return objects, symbols
+
+
+def live_entries(path: Path, names: tuple[str, ...]) -> dict[str, Entry]:
+    """The entries as Numba itself loads them, by its public functions alone: there is no object code to keep."""
+    with own_settings():
+        from piazzi.kernels.compiler import public_way
+
+        with public_way():
+            module = import_file(path)
+        callbacks = {name: getattr(module, name) for name in names}
+        return {name: Entry(callback.address, _kinds(callback), callback) for name, callback in callbacks.items()}
+
+
+def _kinds(callback: Any) -> tuple[str, ...]:
+    """Of an entry's arguments, by its annotations."""
+    given = callback.__wrapped__.__annotations__.items()
+    return tuple({int: INTEGER, float: REAL}.get(kind, POINTER) for name, kind in given if name != "return")
 
 
 def entry_names(source: str) -> tuple[str, ...]:

@@ -10,11 +10,13 @@ import os
 import tempfile
 import threading
 import time
+import warnings
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from piazzi.kernels.build import compile_entries, entry_names, plain_entries
+from piazzi.kernels.build import compile_entries, entry_names, live_entries, plain_entries
 from piazzi.kernels.folder import Folder, private_folder, writable_folder
 from piazzi.kernels.library import load_objects
 from piazzi.kernels.settings import may_be_kept
@@ -121,13 +123,37 @@ def _build(spec: KernelSpec, place: Folder | None, digest: str) -> dict[str, Any
     with tempfile.TemporaryDirectory(prefix="piazzi-") as folder:
         path = Path(folder) / "kernels.py"
         path.write_text(source)
-        objects, symbols = compile_entries(path, entry_names(source))
+        try:
+            objects, symbols = compile_entries(path, entry_names(source))
+        except (ImportError, AttributeError, TypeError) as error:  # as of parts of Numba that are no longer what they were
+            return _built_publicly(path, source, error)
     if place is not None and may_be_kept():
         try:
             _keep(place, digest, source, objects, symbols)
         except OSError as error:  # a full disk: the code is here, and is made again next time
             LOGGER.info("kernels are not kept in %s: %s", place.path, error.strerror or error)
     return dict(load_objects(objects, symbols))
+
+
+def _built_publicly(path: Path, source: str, error: Exception) -> dict[str, Any]:
+    """The entries by public functions of Numba; raises what was wrong first where they do not serve either."""
+    try:
+        entries = live_entries(path, entry_names(source))
+    except Exception:
+        raise error from None
+    _warn_of_numba(f"{type(error).__name__}: {error}")
+    return dict(entries)
+
+
+@cache
+def _warn_of_numba(why: str) -> None:
+    from importlib.metadata import version
+
+    numba = version("numba")
+    warnings.warn(
+        f"Piazzi does not know Numba {numba} from inside ({why}): every run compiles its kernels anew, and for longer.",
+        stacklevel=2,
+    )
 
 
 def _keep(place: Folder, digest: str, source: str, objects: dict[str, bytes], symbols: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from numba import cfunc, njit, types
 
 from piazzi.expressions.functions import TABLE as _TABLE
-from piazzi.kernels.compiler import EntryPipeline
+from piazzi.kernels.compiler import entry_options
 from piazzi.kernels.lanes import (
     alike,
     ceil,
@@ -69,7 +69,7 @@ def outlined(function: Callable[..., Any]) -> Any:
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls, with C's calling convention; its annotations are its types."""
     kinds = [k for name, k in function.__annotations__.items() if name != "return"]
-    return cfunc(types.void(*(_SCALARS.get(k, k) for k in kinds)), pipeline_class=EntryPipeline, **OPTIONS)(function)
+    return cfunc(types.void(*(_SCALARS.get(k, k) for k in kinds)), **entry_options(), **OPTIONS)(function)
 
 
 unless_missing = inline(_unless_missing)

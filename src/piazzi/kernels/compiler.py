@@ -2,14 +2,39 @@
 
 By itself Numba optimises every helper and turns it into machine code that nothing ever calls, because all are inlined; that is
 half of the time that a kernel takes to compile.  An entry's object code is not loaded here either: `library` does that.
+
+Whatever Piazzi uses of Numba that is not public is named in this file, and in `settings`.
 """
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.cgutils import alloca_once, alloca_once_value, for_range, get_or_insert_function
+from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_global
+
+try:
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import CompilerBase, DefaultPassBuilder
+except ImportError:  # then `public_way` is the only one
+    JITCodeLibrary = CompilerBase = DefaultPassBuilder = object  # type: ignore[assignment,misc]
+
+__all__ = [
+    "AbstractTemplate",
+    "AttributeTemplate",
+    "alloca_once",
+    "alloca_once_value",
+    "entry_options",
+    "for_range",
+    "get_or_insert_function",
+    "helper_options",
+    "infer_global",
+    "object_code",
+    "public_way",
+]
 
 LINE = 64  # bytes that a processor fetches at a time
 
@@ -82,3 +107,43 @@ class EntryPipeline(_Pipeline):
     """For functions that Python calls."""
 
     kind = _Object
+
+
+_publicly = False
+
+
+@contextmanager
+def public_way() -> Iterator[None]:
+    """Numba's own way for as long as the block lasts: no object code, longer compilation, nothing that is not public."""
+    global _publicly  # noqa: PLW0603
+    _publicly = True
+    _forget_marked()
+    try:
+        yield
+    finally:
+        _publicly = False
+        _forget_marked()
+
+
+def _forget_marked() -> None:
+    """Import anew, when they are wanted, the modules whose functions are marked for a way of compiling as they are imported."""
+    for package, name in (("piazzi.kernels", "compiled"), ("piazzi.kernels.lanes", "elementary")):
+        sys.modules.pop(f"{package}.{name}", None)
+        vars(sys.modules[package]).pop(name, None)
+
+
+def helper_options() -> dict[str, Any]:
+    """What a function is compiled with that others call."""
+    pipeline = {} if _publicly else {"pipeline_class": HelperPipeline}
+    return {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **pipeline}
+
+
+def entry_options() -> dict[str, Any]:
+    """What a function is compiled with that Python calls."""
+    return {} if _publicly else {"pipeline_class": EntryPipeline}
+
+
+def object_code(callback: Any) -> bytes:
+    """The object file of an entry."""
+    code: bytes = callback._library.object_code()
+    return code

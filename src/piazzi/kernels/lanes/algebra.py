@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from llvmlite import ir
-from numba.core import types
-from numba.core.cgutils import alloca_once, for_range, get_or_insert_function
+from numba import types
 
+from piazzi.kernels.compiler import alloca_once, for_range, get_or_insert_function
 from piazzi.kernels.lanes.kinds import DOUBLE, FUSE, INDEX, Matrix, Pack, Vector, element, llvm_type
 
 # `b` is the IR builder throughout; values are LLVM values of the types above.

@@ -15,14 +15,14 @@ from typing import Any
 
 from numba import njit
 
-from piazzi.kernels.compiler import HelperPipeline
+from piazzi.kernels.compiler import helper_options
 from piazzi.kernels.lanes.functions import maximum, minimum
 from piazzi.kernels.lanes.pieces import below, choose, exponent, mended, nearest, polynomial, two_to, with_sign
 
 fabs, sqrt = math.fabs, math.sqrt
 # "contract" lets a*b + c round once; nothing else of fast-math, so that NaN keeps meaning "missing"
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
-HELPER: dict[str, Any] = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": HelperPipeline}
+HELPER: dict[str, Any] = OPTIONS | helper_options()
 
 # pi/2 and ln 2 in parts: the first two (the first) have 33 bits, so that whole multiples up to 2^20 are exact
 QUARTER_TURN = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21)

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils, types
-from numba.core.imputils import lower_builtin
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic
+from numba import types
+from numba.extending import intrinsic, lower_builtin
 
 from piazzi.expressions.functions import TABLE
+from piazzi.kernels.compiler import AbstractTemplate, get_or_insert_function, infer_global
 from piazzi.kernels.lanes.algebra import get, join, widen
 from piazzi.kernels.lanes.kinds import Pack, element, lanes_of
 
@@ -22,7 +21,7 @@ def _vector_instruction(name: str) -> Callable[..., Any]:
 
     def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
         ty = args[0].type
-        callee = cgutils.get_or_insert_function(b.module, ir.FunctionType(ty, [ty] * len(args)), f"llvm.{name}.v{ty.count}f64")
+        callee = get_or_insert_function(b.module, ir.FunctionType(ty, [ty] * len(args)), f"llvm.{name}.v{ty.count}f64")
         return b.call(callee, args)
 
     return lower
@@ -32,7 +31,7 @@ def _lane_by_lane(function: Any) -> Callable[..., Any]:
     """A function that only exists for one number: the same results as the scalar code."""
 
     def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
-        single = signature(types.float64, *[types.float64] * len(args))
+        single = types.float64(*[types.float64] * len(args))
         values = [widen(b, have, sig.return_type, v) for have, v in zip(sig.args, args, strict=True)]
         scalar = context.get_function(function, single)
         return join(b, sig.return_type, [scalar(b, [get(b, v, i) for v in values]) for i in range(sig.return_type.w)])
@@ -47,7 +46,7 @@ def _register_function(function: Any, lower: Callable[..., Any], arguments: int)
             packs = [a for a in args if isinstance(a, Pack)]
             if len(args) != arguments or not packs:
                 return None
-            return signature(packs[0], *(types.float64 if isinstance(a, types.Number) else a for a in args))
+            return packs[0](*(types.float64 if isinstance(a, types.Number) else a for a in args))
 
     lower_builtin(function, *[Pack] * arguments)(lower)
     if arguments == 2:
@@ -111,7 +110,7 @@ def _ceil(typing: Any, x: Any) -> Any:
     def lower(context: Any, b: Any, sig: Any, args: Any) -> Any:
         ty = args[0].type
         name = f"llvm.ceil.v{ty.count}f64" if isinstance(ty, ir.VectorType) else "llvm.ceil.f64"
-        return b.call(cgutils.get_or_insert_function(b.module, ir.FunctionType(ty, [ty]), name), args)
+        return b.call(get_or_insert_function(b.module, ir.FunctionType(ty, [ty]), name), args)
 
     return kind(kind), lower
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba.core import types
+from numba import types
 from numba.extending import models, register_model
 
 DOUBLE, INDEX = ir.DoubleType(), ir.IntType(32)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba.core import types
-from numba.core.cgutils import alloca_once
+from numba import types
 from numba.extending import intrinsic
 
+from piazzi.kernels.compiler import alloca_once
 from piazzi.kernels.lanes.algebra import get, join, parts, scale, scaled_sum, widen
 from piazzi.kernels.lanes.kinds import DOUBLE, Matrix, Vector, element, lanes_of, llvm_type, wider
 

@@ -7,11 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba.core import types
-from numba.core.imputils import lower_builtin, lower_getattr
-from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer, infer_getattr, infer_global, signature
-from numba.extending import intrinsic
+from numba import types
+from numba.extending import infer, infer_getattr, intrinsic, lower_builtin, lower_getattr
 
+from piazzi.kernels.compiler import AbstractTemplate, AttributeTemplate, infer_global
 from piazzi.kernels.lanes.algebra import (
     LOOPED,
     combine,
@@ -103,7 +102,7 @@ def _register(op: Any, result: Callable[..., Any], lower: Callable[..., Any]) ->
             if len(args) != 2 or not any(isinstance(a, (Pack, Vector, Matrix)) for a in args):
                 return None
             ty = result(*args)
-            return None if ty is None else signature(ty, *(types.float64 if isinstance(a, types.Number) else a for a in args))
+            return None if ty is None else ty(*(types.float64 if isinstance(a, types.Number) else a for a in args))
 
     def implement(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return lower(builder, sig, *args)
@@ -141,7 +140,7 @@ def fused(typing: Any, s: Any, x: Any, y: Any) -> Any:
 @infer_global(operator.neg)
 class _Negative(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
-        return signature(args[0], args[0]) if isinstance(args[0], (Pack, Vector, Matrix)) else None
+        return args[0](args[0]) if isinstance(args[0], (Pack, Vector, Matrix)) else None
 
 
 def _lower_neg(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -161,8 +160,8 @@ class _Entry(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
         v, _ = args
         if isinstance(v, Matrix):
-            return signature(v.row, *args)
-        return signature(element(v.w), *args) if isinstance(v, Vector) else None
+            return v.row(*args)
+        return element(v.w)(*args) if isinstance(v, Vector) else None
 
 
 def _lower_entry(context: Any, builder: Any, sig: Any, args: Any) -> Any:

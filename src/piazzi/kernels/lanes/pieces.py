@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils, types
-from numba.core.typing.templates import signature
+from numba import types
 from numba.extending import intrinsic
 
+from piazzi.kernels.compiler import alloca_once_value, get_or_insert_function
 from piazzi.kernels.lanes.algebra import get, join, widen
 from piazzi.kernels.lanes.kinds import FUSE, Pack, element, lanes_of
 
@@ -44,7 +44,7 @@ def _of_one_kind(name: str, build: Callable[..., Any], arguments: int) -> Any:
             values = [widen(b, have, result, v) for have, v in zip(sig.args, args, strict=True)]
             return build(context, b, *values)
 
-        return signature(result, *taken), lower
+        return result(*taken), lower
 
     def one(typing: Any, x: Any) -> Any:
         return work((x,))
@@ -68,7 +68,7 @@ def _instruction(name: str) -> Callable[..., Any]:
         ty = values[0].type
         suffix = f"v{ty.count}f64" if isinstance(ty, ir.VectorType) else "f64"
         kind = ir.FunctionType(ty, [ty] * len(values))
-        return b.call(cgutils.get_or_insert_function(b.module, kind, f"llvm.{name}.{suffix}"), values)
+        return b.call(get_or_insert_function(b.module, kind, f"llvm.{name}.{suffix}"), values)
 
     return build
 
@@ -127,9 +127,9 @@ def mended(function: Any, arguments: int) -> Any:
         w = value.type.count if isinstance(value.type, ir.VectorType) else 1
         whole = ir.IntType(w)
         every = good if w == 1 else b.icmp_signed("==", b.bitcast(good, whole), ir.Constant(whole, -1))
-        result = cgutils.alloca_once_value(b, value)
+        result = alloca_once_value(b, value)
         with b.if_then(b.not_(every), likely=False):
-            scalar = context.get_function(function, signature(types.float64, *[types.float64] * arguments))
+            scalar = context.get_function(function, types.float64(*[types.float64] * arguments))
             lanes = [scalar(b, [get(b, v, i) if w > 1 else v for v in given]) for i in range(w)]
             b.store(b.select(good, value, join(b, element(w), lanes) if w > 1 else lanes[0]), result)
         return b.load(result)
