@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import importlib.util
+import tempfile
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from piazzi.kernels.library import INTEGER, POINTER, REAL, Entry, PlainEntry
 from piazzi.kernels.settings import own_settings
+
+UNKNOWN_INSIDE = (ImportError, AttributeError, TypeError)
 
 
 def import_file(path: Path) -> ModuleType:
@@ -28,7 +31,31 @@ def plain_entries(path: Path, names: tuple[str, ...]) -> dict[str, PlainEntry]:
 
 
 def compile_entries(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
-    """Object code of each entry, and its symbol with the kinds of its arguments."""
+    """Object code of each entry, and its symbol with the kinds of its arguments.
+
+    Raises
+    ------
+    ImportError, AttributeError, TypeError
+        Among others, where parts of Numba are no longer what they were: `live_entries` may serve.
+    """
+    try:
+        return _compiled(path, names)
+    except UNKNOWN_INSIDE:
+        raise
+    except Exception as error:
+        tell_of_source(path, error)
+        raise
+
+
+def tell_of_source(path: Path, error: Exception) -> None:
+    """Keep a copy of a source beside the folder that it is built in, which goes, and name it in the error."""
+    handle, name = tempfile.mkstemp(prefix="failed-", suffix=".py", dir=path.parent.parent)
+    with open(handle, "wb") as copy:
+        copy.write(path.read_bytes())
+    error.add_note(f"the source of the kernel that could not be compiled is kept in {name}")
+
+
+def _compiled(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     with own_settings():
         from piazzi.kernels.compiler import object_code
 

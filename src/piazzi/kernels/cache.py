@@ -16,7 +16,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from piazzi.kernels.build import compile_entries, entry_names, live_entries, plain_entries
+from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, entry_names, live_entries, plain_entries, tell_of_source
 from piazzi.kernels.folder import Folder, private_folder, writable_folder
 from piazzi.kernels.library import load_objects
 from piazzi.kernels.settings import may_be_kept
@@ -125,7 +125,7 @@ def _build(spec: KernelSpec, place: Folder | None, digest: str) -> dict[str, Any
         path.write_text(source)
         try:
             objects, symbols = compile_entries(path, entry_names(source))
-        except (ImportError, AttributeError, TypeError) as error:  # as of parts of Numba that are no longer what they were
+        except UNKNOWN_INSIDE as error:
             return _built_publicly(path, source, error)
     if place is not None and may_be_kept():
         try:
@@ -140,6 +140,7 @@ def _built_publicly(path: Path, source: str, error: Exception) -> dict[str, Any]
     try:
         entries = live_entries(path, entry_names(source))
     except Exception:
+        tell_of_source(path, error)
         raise error from None
     _warn_of_numba(f"{type(error).__name__}: {error}")
     return dict(entries)
