@@ -21,7 +21,6 @@ HEAVY = {
     "xarray",
     "scipy",
     "pandas",
-    "pydantic",
     "h5py",
     "h5netcdf",
     "rich",

@@ -103,6 +103,12 @@ def test_every_package_imported_is_declared():
         assert not unknown, unknown
 
 
+def test_every_package_declared_is_imported():
+    """What a user has to install is used: by an import, or by its name handed to one."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert declared(project["dependencies"]) - packages_imported(SOURCE).keys() == set()
+
+
 @pytest.mark.slow
 def test_wheel_carries_every_file_of_the_package(tmp_path):
     subprocess.run(

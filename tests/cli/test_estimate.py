@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
-from piazzi.problem import Gaussian
-from piazzi.scenarios import load_scenario, show
+from piazzi.scenarios import show
 
 SCENARIO = "b612-range"
 
@@ -176,21 +175,28 @@ def test_an_estimator_that_raises_keeps_its_row_and_the_others_theirs(call, monk
     assert call("estimate", SCENARIO, "--with", "graph").status == 3
 
 
-def test_an_estimate_that_is_not_finite_is_status_3_and_still_strict_json(call, tmp_path):
-    """A probe that is believed to start at rest falls into the centre."""
-    scenario = load_scenario(SCENARIO)
-    from dataclasses import replace
-
-    prior = Gaussian([1.0, 0, 0, 0], 1e-12 * np.eye(4))
-    problem = replace(scenario.problem, prior=prior, truth=None, process_noise=None)
-    tracking = pz.Tracking(np.arange(400) * 0.1, np.full(400, 9.0), truth=np.ones((400, 4)))
-    from piazzi.io import save
-
-    save(tmp_path / "fall.nc", problem, tracking)
-    result = call("estimate", tmp_path / "fall.nc", "--json", "-o", tmp_path / "fall.json")
+def test_an_estimate_that_is_not_finite_is_status_3_and_still_strict_json(call, tmp_path, monkeypatch):
+    """The motion x' = x^3 from x = 1 reaches infinity at t = 1/2."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    (tmp_path / "burst.toml").write_text(
+        """
+        states = { x = "length" }
+        dynamics = { x = "x**3" }
+        sensors.ruler.components.place = { equation = "x", unit = "length" }
+        stations = [{ name = "wall", sensor = "ruler", noise = { sigma = 1.0 } }]
+        prior = { mean = [1.0], sigma = [0.1] }
+        times = { step = 1.0, count = 3 }
+        """
+    )
+    (tmp_path / "rows.csv").write_text("time,place\n0,1\n1,1\n2,1\n")
+    arguments = (tmp_path / "rows.csv", "--scenario", tmp_path / "burst.toml")
+    result = call("estimate", *arguments, "--json", "-o", tmp_path / "burst.json")
     (row,) = result.document["rows"]
-    assert (result.status == 3) == (not row["success"])
-    json.loads((tmp_path / "fall.json").read_text(), parse_constant=pytest.fail)
+    assert (result.status, row["success"]) == (3, False)
+    assert row["message"].startswith("the estimate is not finite from epoch 1 (t = 1 s)")
+    written = json.loads((tmp_path / "burst.json").read_text(), parse_constant=pytest.fail)
+    assert written["rows"][0]["final"]["mean"] == [None]
+    assert [v[0] is None for v in written["series"]["mean"]] == [False, True, True]
 
 
 def test_long_steps_are_warned_of_in_one_line(call, tmp_path):

@@ -47,7 +47,7 @@ def test_a_warning_of_long_steps_is_on_the_page(call, data_dir, tmp_path):
     page = tmp_path / "page.html"
     found = call("report", data_dir / "satellite" / "slide_example.npz", "--with", "ekf", "-o", page)
     assert "steps are too long" in found.err
-    assert "Beware" in page.read_text() and "steps are too long" in page.read_text()
+    assert "Warning" in page.read_text() and "steps are too long" in page.read_text()
 
 
 def test_bad_places_and_sources_are_refused(call, tmp_path):

@@ -98,7 +98,9 @@ def test_ipython_in_a_terminal_gets_text(monkeypatch, capsys):
     assert "F = df/dx" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", ["alpha", "x_1", "beta_dot"])
-def test_latex_of_names(name):
-    assert pz.Model([name], [f"-{name}"]) is not None
-    assert "$$" in latex(pz.Model([name], [f"-{name}"]))
+@pytest.mark.parametrize(("name", "written"), [("alpha", r"\alpha"), ("x_1", "x_{1}"), ("beta_dot", r"\beta_{dot}")])
+def test_latex_of_names(name, written):
+    """A Greek letter is one, and what follows an underscore is an index: in the state, its rate and its derivative."""
+    text = latex(pz.Model([name], [f"-3*{name}"]))
+    assert f"- 3 {written}" in text
+    assert name not in text.replace(written, "")

@@ -234,12 +234,12 @@ def with_rows(comparison: Comparison, **changes) -> Comparison:
 def test_the_best_is_named_with_its_error(comparison):
     rows = [r for r in comparison.rows if r.view == "realtime"]
     best = min(rows, key=lambda r: r.rmse_last_half["position"])
-    text = said(comparison)["Best while measuring"]
+    text = said(comparison)["Best in real time"]
     assert text.startswith(best.estimator)
     assert f"{best.rmse_last_half['position'] / 1e3:.4g}" in text
     rows = [r for r in comparison.rows if r.view == "delayed"]
     best = min(rows, key=lambda r: r.rmse["position"])
-    text = said(comparison)["Best with all in hand"]
+    text = said(comparison)["Best with all measurements"]
     assert text.startswith(best.estimator)
     assert f"{best.rmse['position'] / 1e3:.4g}" in text
 
@@ -248,7 +248,7 @@ def test_who_is_not_to_be_trusted_is_named_with_the_reason(comparison):
     assert "ekf" in said(with_rows(comparison, diverged=True))["Diverged"]
     failed = said(with_rows(comparison, success=False, message="the state left the planet"))
     assert failed["Did not succeed"] == "ekf: the state left the planet."
-    assert "ekf" not in failed["Best while measuring"]
+    assert "ekf" not in failed["Best in real time"]
 
 
 def with_nees(row, value: float, low: float = 3.0, high: float = 5.0):
@@ -259,34 +259,34 @@ def with_nees(row, value: float, low: float = 3.0, high: float = 5.0):
 
 def test_honesty_is_judged_by_the_tests_where_there_are_any(comparison):
     fair = [with_nees(r, 4.0) for r in comparison.rows]
-    assert said(replace(comparison, rows=tuple(fair)))["Covariance holds"].startswith("Errors of all are as large")
+    assert said(replace(comparison, rows=tuple(fair)))["Consistent covariance"].startswith("Errors of all are consistent with")
     sure = said(replace(comparison, rows=(with_nees(fair[0], 36.0), *fair[1:])))
-    assert sure["Too sure of themselves"].startswith("Errors of ekf are 3.0 times as large as the covariance says")
-    assert sure["Covariance holds"].startswith("Errors of all but ekf are")
-    assert "ekf" in said(replace(comparison, rows=(with_nees(fair[0], 1.0), *fair[1:])))["Too cautious"]
-    wide = with_nees(fair[0], 36.0, 0.1, 50.0)  # a run that hangs together so much that even this proves nothing
-    assert "Too sure of themselves" not in said(replace(comparison, rows=(wide, *fair[1:])))
+    assert sure["Optimistic covariance"].startswith("Errors of ekf are about 3.0 times what the covariance predicts")
+    assert sure["Consistent covariance"].startswith("Errors of all but ekf are")
+    assert "ekf" in said(replace(comparison, rows=(with_nees(fair[0], 1.0), *fair[1:])))["Pessimistic covariance"]
+    wide = with_nees(fair[0], 36.0, 0.1, 50.0)  # a run so correlated in time that even this proves nothing
+    assert "Optimistic covariance" not in said(replace(comparison, rows=(wide, *fair[1:])))
 
 
 def test_honesty_is_judged_by_a_factor_without_tests(comparison):
     rows = [replace(with_nees(r, 4.0), honesty=Honesty()) for r in comparison.rows]
     rows[0] = replace(with_nees(rows[0], 36.0), honesty=Honesty())
-    assert "Errors of ekf are 3.0" in said(replace(comparison, rows=tuple(rows)))["Too sure of themselves"]
+    assert "Errors of ekf are about 3.0" in said(replace(comparison, rows=tuple(rows)))["Optimistic covariance"]
 
 
 def test_innovations_that_are_not_noise_are_told(comparison):
     rows = [with_nees(r, 4.0) for r in comparison.rows]
     odd = replace(rows[0], honesty=replace(rows[0].honesty, whiteness=Check(99.0, 0.0, 18.3, 10), bias=Check(9.0, 0.0, 3.8, 1)))
-    text = said(replace(comparison, rows=(odd, *rows[1:])))["Innovations are not noise"]
-    assert "those of ekf hang together in time and are off to one side" in text
-    assert "Innovations are not noise" not in said(replace(comparison, rows=tuple(rows)))
+    text = said(replace(comparison, rows=(odd, *rows[1:])))["Innovations are not white noise"]
+    assert "those of ekf are correlated in time and have a mean other than zero" in text
+    assert "Innovations are not white noise" not in said(replace(comparison, rows=tuple(rows)))
 
 
 def test_without_truth_the_summary_says_so(comparison):
     bare = replace(comparison.tracking, truth=None)
     found = said(compare(comparison.problem, bare, {"ekf": pz.ExtendedKalmanFilter()}))
     assert "no truth" in found["Errors unknown"]
-    assert found["Covariance holds"].startswith("Innovations of ekf")
+    assert found["Consistent covariance"].startswith("Innovations of ekf")
 
 
 def test_lists_of_names():
@@ -298,7 +298,7 @@ def test_lists_of_names():
 def test_both_views_of_a_window_are_one_name(comparison):
     def cautious(*chosen: tuple[str, str]) -> str:
         rows = [with_nees(r, 1.0 if (r.estimator, r.view) in chosen else 4.0) for r in comparison.rows]
-        return said(replace(comparison, rows=tuple(rows)))["Too cautious"]
+        return said(replace(comparison, rows=tuple(rows)))["Pessimistic covariance"]
 
     both = (("ekf", "realtime"), ("window:10", "realtime"), ("window:10", "delayed"))
     assert cautious(*both).startswith("Errors of ekf and window:10 are")

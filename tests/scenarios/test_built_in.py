@@ -79,7 +79,7 @@ def test_equal_models_are_one_object(tmp_path):
 def test_loading_imports_nothing_heavy():
     code = (
         "import sys; from piazzi.scenarios import load_scenario, names; [load_scenario(n) for n in names()];"
-        "heavy = ('sympy', 'numba', 'llvmlite', 'pandas', 'xarray', 'h5py', 'pydantic', 'matplotlib');"
+        "heavy = ('sympy', 'numba', 'llvmlite', 'pandas', 'xarray', 'h5py', 'matplotlib');"
         "print([m for m in heavy if m in sys.modules])"
     )
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.strip() == "[]"

@@ -57,9 +57,7 @@ def test_ralston_has_the_smallest_error_bound_of_its_family():
 def test_ways_to_write_a_tableau_are_one():
     kutta3 = kernels.RungeKutta([[], [0.5], [-1, 2]], [1 / 6, 2 / 3, 1 / 6], [0, 0.5, 1], substeps=3)
     full = kernels.RungeKutta(np.array([[0, 0, 0], [0.5, 0, 0], [-1, 2, 0]]), np.array([1, 4, 1]) / 6, substeps=3)
-    short = kernels.RungeKutta(
-        [["1/2"], [-1, 2]] and [[Fraction(1, 2)], [-1, 2]], [Fraction(1, 6), Fraction(2, 3), Fraction(1, 6)], substeps=3
-    )
+    short = kernels.RungeKutta([[Fraction(1, 2)], [-1, 2]], [Fraction(1, 6), Fraction(2, 3), Fraction(1, 6)], substeps=3)
     assert kutta3 == full == short
     assert hash(kutta3) == hash(short)
     assert kutta3.scheme == full.scheme
@@ -70,6 +68,7 @@ def test_ways_to_write_a_tableau_are_one():
     ("a", "b", "c", "message"),
     [
         ([[], [0.5]], [0.5, 0.4], None, "weights b add up to 0.9"),
+        ([["1/2"]], [0.0, 1.0], None, r"\['1/2'\].*must be numbers"),
         ([[], [0.5]], [0.0, 1.0], [0.0, 0.4], r"row 1 of a adds up to 0.5, but its node c\[1\] is 0.4"),
         ([[0.5], [0.5]], [0.0, 1.0], None, r"a\[0\]\[0\] is 0.5: an explicit method"),
         ([[0, 0], [0.5, 0.5]], [0.0, 1.0], None, r"a\[1\]\[1\] is 0.5: an explicit method"),

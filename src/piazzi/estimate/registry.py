@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, cast
@@ -190,3 +190,22 @@ def parse(text: str) -> Estimator:
         return ESTIMATORS[name].build(option)
     except ValueError as error:
         raise ValueError(f"estimator {text!r}: {error}") from None
+
+
+def by_name(estimators: Mapping[str, Estimator] | Sequence[str]) -> Mapping[str, Estimator]:
+    """The mapping as it is, or the estimators that a list of names means; raises ValueError for what is neither."""
+    found: dict[str, Estimator] = {}
+    if isinstance(estimators, Mapping):
+        found = dict(estimators)
+    elif isinstance(estimators, str):
+        raise ValueError(f"estimators is {estimators!r}; it must be a list of names or a mapping")
+    else:
+        for name in estimators:
+            if not isinstance(name, str):
+                raise ValueError(f"estimators has {name!r}: give names, or a mapping of names to estimators")
+            if name in found:
+                raise ValueError(f"estimator {name!r} is named twice")
+            found[name] = parse(name)
+    if not found:
+        raise ValueError("there are no estimators to compare")
+    return found

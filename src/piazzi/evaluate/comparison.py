@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from piazzi.estimate import Estimate, Estimator
 from piazzi.estimate.estimator import views_of
+from piazzi.estimate.registry import by_name
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
 from piazzi.evaluate.display import html, render
 from piazzi.evaluate.grids import as_text
@@ -96,7 +97,7 @@ class Comparison:
 def compare(
     problem: Problem,
     tracking: Tracking,
-    estimators: Mapping[str, Estimator],
+    estimators: Mapping[str, Estimator] | Sequence[str],
     *,
     source: str = "",
     announce: Callable[[str], None] | None = None,
@@ -108,7 +109,7 @@ def compare(
     ----------
     problem : Problem
     tracking : Tracking
-    estimators : mapping of the name to show to the estimator
+    estimators : mapping of the name to show to the estimator, or names as on the command line, such as ["ekf", "window:100"]
     source : where the measurements came from, for the record
     announce : called with each name before its estimator starts
     thorough : whether to find the Cramer-Rao bound and to make the tests of honesty too, for which the problem is linearised
@@ -116,13 +117,14 @@ def compare(
     Raises
     ------
     ValueError
-        Where the tracking does not fit the problem, so that no estimator could run.
+        For names that mean no estimator, and where the tracking does not fit the problem, so that no estimator could run.
     """
+    chosen = by_name(estimators)
     prepare(problem, tracking)
     bounds = bounds_of(problem, tracking) if thorough else None
     rows: list[Row] = []
     estimates: dict[str, Estimate] = {}
-    for name, estimator in estimators.items():
+    for name, estimator in chosen.items():
         if announce is not None:
             announce(name)
         try:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, sigma_factor, unit_of
+from piazzi.evaluate.judgement import claims, errors_known, expected_nis, failing, fails_early, sound, tested
+from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, unit_of
 from piazzi.model import Model
 from piazzi.text import printable
 
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
 
     from piazzi.evaluate.comparison import Comparison
-    from piazzi.evaluate.consistency import Check
     from piazzi.evaluate.rows import Row
 
 _VIEW = {"realtime": "real time", "delayed": "delayed"}
@@ -68,7 +66,7 @@ def columns(comparison: Comparison) -> list[Column]:
     found += [
         Column("mean NEES", "whole run", whole, tuple(number(r.mean_nees, 3) for r in rows)),
         Column("mean NEES", "last half", half, tuple(number(r.mean_nees_last_half, 3) for r in rows)),
-        Column("mean NIS", "", ideal([expected_nis(comparison)]), tuple(number(r.mean_nis, 3) for r in rows)),
+        Column("mean NIS", "", ideal([expected_nis(comparison.tracking.values)]), tuple(number(r.mean_nis, 3) for r in rows)),
         Column(TESTS, "", "5 % each", tuple(", ".join(failing(r)) or (PASSED if tested(r) else "") for r in rows)),
         Column("iterations", "", "", tuple(str(r.iterations) if r.iterations else NOTHING for r in rows)),
         Column("time", "", "", tuple(duration(r.seconds) for r in rows)),
@@ -77,34 +75,12 @@ def columns(comparison: Comparison) -> list[Column]:
     return [c for i, c in enumerate(found) if i < _TEXT_COLUMNS or any(v not in ("", NOTHING) for v in c.texts)]
 
 
-def tested(row: Row) -> bool:
-    """Whether there is any test of this row."""
-    return any(check is not None for check in _checks(row).values())
-
-
-def failing(row: Row) -> list[str]:
-    """Names of the tests that a row does not pass."""
-    return [name for name, check in _checks(row).items() if check is not None and not check.passed]
-
-
-def _checks(row: Row) -> dict[str, Check | None]:
-    """The tests that are shown, by the name that they are shown under: NEES once the estimator has settled."""
-    h = row.honesty
-    return {"NEES": h.nees_last_half, "NIS": h.nis, "whiteness": h.whiteness, "bias": h.bias}
-
-
 def _times(value: float | None, factor: float) -> float | None:
     return None if value is None else value * factor
 
 
 def _remark(row: Row) -> str:
     return "FAILED" if not row.success else "diverged" if row.diverged else ""
-
-
-def expected_nis(comparison: Comparison) -> float | None:
-    """Mean number of components per row of measurements: what a mean NIS should be near."""
-    present = (~np.isnan(comparison.tracking.values)).sum(axis=1)
-    return float(present[present > 0].mean()) if present.any() else None
 
 
 def html(comparison: Comparison) -> str:
@@ -185,39 +161,39 @@ def _style(value: str) -> str:
 
 
 def sentences(comparison: Comparison) -> list[str]:
-    """What the table means, in plain words: who is best, who admits their errors, who failed."""
-    sound = [r for r in comparison.rows if r.success and not r.diverged]
+    """What the table means, in plain words: who is best, whose covariance is consistent, who failed."""
+    judged = sound(comparison.rows)
     out = [f"{r.estimator} did not succeed: {r.message}." for r in comparison.rows if not r.success]
-    wayward = dict.fromkeys(r.estimator for r in comparison.rows if r.success and r.diverged)
-    out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down enough." for name in wayward]
+    diverged = dict.fromkeys(r.estimator for r in comparison.rows if r.success and r.diverged)
+    out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down enough." for name in diverged]
     out += dict.fromkeys(f"{r.estimator}: {r.message}." for r in comparison.rows if r.success and r.message)
     out += [*_rejected(comparison), *_modes(comparison)]
-    if any(v is not None for r in sound for v in r.rmse.values()):
-        out += [*_best(comparison, sound), *_honest(sound)]
-    elif sound:
-        out += _without_truth(comparison, sound)
-    return [printable(line) for line in [*out, *_tested(sound)]]
+    known = errors_known(judged)
+    if known:
+        out += _best(comparison, judged)
+    elif judged:
+        out.append("There is no truth to compare with, so errors are unknown.")
+    what, basis = ("Errors", "NEES of this one run") if known else ("Innovations", "NIS")
+    for claim in claims(comparison.rows, comparison.tracking.values):
+        names = _list([_named(r, judged) for r in claim.rows])
+        out.append(f"{what} of {names} are {claim.text} ({basis}).")
+    return [printable(line) for line in [*out, *_tested(judged)]]
 
 
 def _tested(rows: Sequence[Row]) -> list[str]:
-    """Who did not pass which tests, and that the others did."""
+    """Who fails which tests, and that the others do not."""
     judged = [r for r in rows if tested(r)]
     found: dict[str, list[str]] = {}
     for row in judged:
         if failing(row):
-            found.setdefault(_list(failing(row)), []).append(_named(row, rows))
-    out = [f"Test of {wrong} not passed by {_list(names)} (5 % level)." for wrong, names in found.items()]
+            test = f"the {_list(failing(row))} test{'s' * (len(failing(row)) > 1)}"
+            found.setdefault(test, []).append(_named(row, rows))
+    out = [f"{_list(names)} fail{'s' * (len(names) == 1)} {which} (5 % level)." for which, names in found.items()]
     passed = [_named(r, rows) for r in judged if not failing(r)]
     who = "All others pass" if out else f"{passed[0]} passes" if len(passed) == 1 else "All pass"
-    out += [f"{who} all tests of honesty (NEES of the last half, NIS, whiteness, bias; 5 % level)."] if passed else []
-    early = [_named(r, rows) for r in judged if _fails_early(r)]
-    return out + ([f"Before that, errors of {_list(early)} are not what was claimed (NEES of the whole run)."] if early else [])
-
-
-def _fails_early(row: Row) -> bool:
-    """Whether NEES is out of its bounds over the whole run, but not over its last half."""
-    whole, last = row.honesty.nees, row.honesty.nees_last_half
-    return whole is not None and last is not None and last.passed and not whole.passed
+    out += [f"{who} the consistency tests (NEES of the last half, NIS, whiteness, bias; 5 % level)."] if passed else []
+    early = [_named(r, rows) for r in judged if fails_early(r)]
+    return out + ([f"Over the whole run the errors of {_list(early)} are inconsistent with the covariance."] if early else [])
 
 
 def _rejected(comparison: Comparison) -> list[str]:
@@ -226,7 +202,7 @@ def _rejected(comparison: Comparison) -> list[str]:
     counts = {r.estimator: r.rejected for r in comparison.rows if r.rejected is not None}
     out = [f"The gate of {name} rejected {count:,} of {total:,} measurements." for name, count in counts.items()]
     counts = {r.estimator: r.outliers for r in comparison.rows if r.outliers is not None}
-    return out + [f"{name} took {count:,} of {total:,} measurements for outliers." for name, count in counts.items()]
+    return out + [f"{name} classified {count:,} of {total:,} measurements as outliers." for name, count in counts.items()]
 
 
 def _modes(comparison: Comparison) -> list[str]:
@@ -238,13 +214,6 @@ def _modes(comparison: Comparison) -> list[str]:
             more = f" and {len(row.modes) - 4} more" if len(row.modes) > 4 else ""
             out.append(f"{row.estimator} found {len(row.modes)} solutions, with probabilities {_list(shares)}{more}.")
     return out
-
-
-def _without_truth(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
-    expected = expected_nis(comparison)
-    factors = {_named(r, rows): sigma_factor(r.mean_nis, expected) for r in rows if r.mean_nis is not None and expected}
-    claims = [f"Innovations of {names} are {claim} (NIS)." for claim, names in _by_claim(factors).items()]
-    return ["There is no truth to compare with, so errors are unknown.", *claims]
 
 
 def _best(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
@@ -259,33 +228,10 @@ def _best(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
     return [f"Smallest {group} error in the last half of the run: {name} ({_VIEW.get(view, view)}), {error} (RMS)."]
 
 
-def _honest(rows: Sequence[Row]) -> list[str]:
-    nees = {_named(r, rows): (r.mean_nees_last_half, r.nees_ideal_last_half) for r in rows}
-    factors = {name: sigma_factor(v, n) for name, (v, n) in nees.items() if v is not None and n and np.isfinite(v)}
-    return [f"Errors of {names} are {claim} (NEES of this one run)." for claim, names in _by_claim(factors).items()]
-
-
 def _named(row: Row, rows: Sequence[Row]) -> str:
     """The estimator's name, with the view where it has two."""
     both = sum(other.estimator == row.estimator for other in rows) > 1
     return f"{row.estimator} ({_VIEW.get(row.view, row.view)})" if both else row.estimator
-
-
-def _by_claim(factors: Mapping[str, float]) -> dict[str, str]:
-    """What can be said of each factor, with the list of those of whom it can be said."""
-    found: dict[str, list[str]] = {}
-    for name, factor in factors.items():
-        found.setdefault(_times_as_large(factor), []).append(name)
-    return {claim: _list(names) for claim, names in found.items()}
-
-
-def _times_as_large(factor: float) -> str:
-    """How errors compare with their covariance; one run cannot tell less than a factor of 1.5."""
-    if 1 / 1.5 <= factor <= 1.5:
-        return "about as large as the covariance says"
-    if factor > 1:
-        return f"about {number(factor, 2)} times as large as the covariance says"
-    return f"about {number(1 / factor, 2)} times smaller than the covariance says" if factor > 0 else "zero"
 
 
 def _list(names: Sequence[str]) -> str:

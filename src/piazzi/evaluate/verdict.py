@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from piazzi.estimate.chi_square import quantile
+from piazzi.evaluate.judgement import CLEARLY
 from piazzi.evaluate.quantities import display_of, number
 from piazzi.problem.checks import Array
 from piazzi.text import printable
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 _SHOWN = 0.1  # smallest component of a direction that is worth telling
 _FEEBLE = 1.0  # singular value up to which the measurements tell less than the prior
 _LUCK = 0.999  # share of matched runs, of errors that never change their direction, that stay within what counts as attained
-_CLEARLY = 1.5  # times the other's errors that are worth a verdict
 _FAR = 5.0  # prior sigmas from which a twin is ruled out
 _LISTED = 4  # twins that are told one by one
 _ALIKE = 3.0  # difference of all measurements together, in sigma, that noise hides
@@ -97,7 +97,7 @@ def _conclusion(found: Observability) -> list[str]:
     attained = float(np.sqrt(quantile(_LUCK, found.problem.model.n) / found.problem.model.n))
     if stray:
         out.append(f"Verdict: a twin; {' and '.join(stray)} ended on its orbit.")
-    elif graph.excess <= attained < ekf.excess and ekf.excess > _CLEARLY * graph.excess:
+    elif graph.excess <= attained < ekf.excess and ekf.excess > CLEARLY * graph.excess:
         out.append(
             "Verdict: linearisation. The information is there and the graph gets it; neither lack of observability nor a twin "
             "is what spoils the EKF, but its Jacobians, taken once and at the wrong place: "

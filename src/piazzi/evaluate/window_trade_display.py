@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.evaluate.display import PASSED, failing, row_display, tested
+from piazzi.evaluate.display import PASSED, row_display
 from piazzi.evaluate.grids import Grid, as_html, as_rich
+from piazzi.evaluate.judgement import failing, tested
 from piazzi.evaluate.quantities import duration, ideal, number
 from piazzi.problem.checks import Array
 

@@ -48,7 +48,7 @@ def comparison_tab(
     return Tab(
         title or comparison.source or "Comparison",
         summary(comparison.problem, comparison.tracking, comparison.source or "measurements"),
-        [*points(comparison), *([Point("Beware", f"{warning[:1].upper()}{warning[1:]}.", "bad")] if warning else [])],
+        [*points(comparison), *([Point("Warning", f"{warning[:1].upper()}{warning[1:]}.", "bad")] if warning else [])],
         [*sections, *more, _table(comparison, views), _reading()],
         keys=views.keys,
         times=views.times if views.found else None,
@@ -62,12 +62,12 @@ def _sections(views: Views, planet_radius: float | None) -> list[Section]:
     return [
         *([Section("The orbit", paths, _PLAY)] if paths else []),
         Section(
-            "How far off, and how far off they expect to be",
+            "Errors and their predicted standard deviations",
             [*group_charts(views), Now("Values at the cursor")],
             "" if known else _UNKNOWN,
         ),
         Section("State by state", state_charts(views), _INSIDE if known else _BANDS),
-        Section("Are they honest?", [*innovations(views), *consistency(views)], _HONEST if known else _HONEST + _NO_NEES),
+        Section("Consistency", [*innovations(views), *consistency(views)], _HONEST if known else _HONEST + _NO_NEES),
     ]
 
 
@@ -90,7 +90,7 @@ def _reading() -> Section:
                     " has settled. Real time means from measurements up to each epoch; delayed, that later ones helped too.",
                     "NEES is the squared error, NIS the squared innovation, in units of the covariance that the estimator"
                     " claims. Their means should be near the number of states and of measured components; where a covariance is"
-                    " singular, near its rank. Errors of one run hang together over time, so one run proves little: try other"
+                    " singular, near its rank. Errors of one run are correlated in time, so one run proves little: try other"
                     " seeds before relying on a covariance.",
                 ]
             )

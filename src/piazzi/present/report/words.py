@@ -6,45 +6,58 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 
 from piazzi.evaluate import Comparison, Row
-from piazzi.evaluate.display import expected_nis, failing, group_display
-from piazzi.evaluate.quantities import duration, number, sigma_factor
+from piazzi.evaluate.display import group_display
+from piazzi.evaluate.judgement import (
+    CLEARLY,
+    CONSISTENT,
+    LEVEL,
+    OPTIMISTIC,
+    PESSIMISTIC,
+    SETTLING,
+    claims,
+    errors_known,
+    failing,
+    fails_early,
+    sound,
+)
+from piazzi.evaluate.quantities import duration, number
 from piazzi.present.report.blocks import Point, Tone
 
-_HEADING = {"realtime": "Best while measuring", "delayed": "Best with all in hand"}
+_HEADING = {"realtime": "Best in real time", "delayed": "Best with all measurements"}
 _PART = {"realtime": "in the last half of the run", "delayed": "over the whole run"}
 _VIEW = {"realtime": "in real time", "delayed": "delayed"}
-_FAULTS = {"NIS": "have the wrong size", "whiteness": "hang together in time", "bias": "are off to one side"}
-_CLAIMS: tuple[tuple[int, str, Tone], ...] = (
-    (1, "Too sure of themselves", "bad"),
-    (0, "Covariance holds", "good"),
-    (-1, "Too cautious", "plain"),
-)
-_LEVEL = 1.01  # errors nearer than this are called the same
-_HONEST = 1.5  # one run cannot tell a smaller factor
+_FAULTS = {
+    "NIS": "are larger or smaller than their covariance predicts",
+    "whiteness": "are correlated in time",
+    "bias": "have a mean other than zero",
+}
+_CLAIMS: Mapping[int, tuple[str, Tone, str]] = {
+    OPTIMISTIC: ("Optimistic covariance", "bad", ": widen it, or find what the model leaves out"),
+    CONSISTENT: ("Consistent covariance", "good", ", as far as one run can tell"),
+    PESSIMISTIC: ("Pessimistic covariance", "plain", ""),
+}
 _FEW = 3  # names that a sentence lists before it counts them
-_SETTLING = 5.0  # times the error of the last half that the whole run's must be to be called slow to settle
 
 
 def points(comparison: Comparison) -> list[Point]:
     """The summary of a comparison, the most useful first."""
     rows = comparison.rows
-    sound = [r for r in rows if r.success and not r.diverged]
-    known = any(v is not None for r in sound for v in r.rmse.values())
+    judged = sound(rows)
     out: list[Point] = []
-    if known:
-        out += [p for view in ("realtime", "delayed") for p in _best(comparison, [r for r in sound if r.view == view], view)]
-    elif sound:
-        out.append(Point("Errors unknown", "There is no truth to compare with: here is what estimators say of themselves."))
+    if errors_known(judged):
+        out += [p for view in ("realtime", "delayed") for p in _best(comparison, [r for r in judged if r.view == view], view)]
+    elif judged:
+        out.append(Point("Errors unknown", "There is no truth to compare with; innovations are judged instead."))
     out += _failed(rows)
-    out += _honesty(comparison, sound, known)
-    out += _against(sound)
-    out += _settling(comparison, sound)
+    out += _honesty(comparison)
+    out += _against(judged)
+    out += _settling(comparison, judged)
     out += _cost(rows)
     return out or [Point("Nothing to show", "No estimator gave a result.", "bad")]
 
 
 def _counted(row: Row) -> Mapping[str, float | None]:
-    """Errors that count for a row: once settled while measuring, over the whole run where all measurements are in hand."""
+    """Errors that count for a row: of the last half in real time, of the whole run for delayed estimates."""
     return row.rmse_last_half if row.view == "realtime" else row.rmse
 
 
@@ -55,15 +68,15 @@ def _best(comparison: Comparison, rows: Sequence[Row], view: str) -> list[Point]
         return []
     ranked = sorted(found, key=lambda pair: pair[0])
     best, first = ranked[0]
-    level = [r.estimator for v, r in ranked if v <= _LEVEL * best]
+    level = [r.estimator for v, r in ranked if v <= LEVEL * best]
     others = [v for v, _ in ranked[len(level) :]]
     text = f"{listed(level)}: {_errors(comparison, first)} {_PART[view]}"
     if others:
         text += f"; {'the other has' if len(others) == 1 else 'the others have'} {_more(others, best)}"
     elif len(ranked) == 1:
         text += "; there is no other to compare with"
-    if others and others[-1] < _HONEST * best:
-        text += ", which may be the luck of one run"
+    if others and others[-1] < CLEARLY * best:
+        text += ", a difference that one run cannot establish"
     text += _bound(comparison, first, group)
     return [Point(_HEADING[view], f"{text}.", "good")]
 
@@ -74,7 +87,7 @@ def _bound(comparison: Comparison, row: Row, group: str) -> str:
     if bound is None or not isfinite(bound):
         return ""
     show = group_display(comparison, group)
-    return f". Over many such runs no unbiased estimator does better than {number(bound * show.factor, 3)}{show.suffix}"
+    return f". The Cramer-Rao bound, a mean over many such runs, is {number(bound * show.factor, 3)}{show.suffix}"
 
 
 def _first_group(rows: Sequence[Row]) -> str:
@@ -115,43 +128,20 @@ def _failed(rows: Sequence[Row]) -> list[Point]:
     return out
 
 
-def _judged(row: Row, known: bool, m: float | None) -> tuple[float, int] | None:
-    """Errors (else innovations) in units of what the covariance says, and 1 where they are too large, -1 too small, else 0.
-
-    By the test of mean NEES that allows for correlation in time, where there is one; else by a factor that one run can tell.
-    """
-    early = row.view != "realtime"
-    of_errors = (row.mean_nees, row.nees_ideal) if early else (row.mean_nees_last_half, row.nees_ideal_last_half)
-    value, expected = of_errors if known else (row.mean_nis, m)
-    if value is None or not isfinite(value) or not expected:
-        return None
-    factor = sigma_factor(value, expected)
-    check = (row.honesty.nees if early else row.honesty.nees_last_half) if known else row.honesty.nis
-    if check is None or not isfinite(check.high):
-        return factor, int(factor > _HONEST) - int(factor < 1 / _HONEST)
-    return factor, int(check.statistic > check.high) - int(check.statistic < check.low)
-
-
-def _honesty(comparison: Comparison, rows: Sequence[Row], known: bool) -> list[Point]:
+def _honesty(comparison: Comparison) -> list[Point]:
     """Whose covariance can be taken at its word."""
-    m = expected_nis(comparison)
-    found = [(r, judged) for r in rows if (judged := _judged(r, known, m)) is not None]
-    judged_rows, what = [r for r, _ in found], "Errors" if known else "Innovations"
+    found = claims(comparison.rows, comparison.tracking.values)
+    everyone = [r for claim in found for r in claim.rows]
+    what = "Errors" if errors_known(sound(comparison.rows)) else "Innovations"
     out = []
-    for sign, heading, tone in _CLAIMS:
-        chosen = [(r, factor) for r, (factor, where) in found if where == sign]
-        if chosen:
-            names, factors = _named([r for r, _ in chosen], judged_rows), [f for _, f in chosen]
-            out.append(Point(heading, f"{what} of {names} are {_claim(sign, factors)}.", tone))
+    for claim in found:
+        heading, tone, advice = _CLAIMS[claim.sign]
+        out.append(Point(heading, f"{what} of {_named(claim.rows, everyone)} are {claim.text}{advice}.", tone))
+    early = [r for r in everyone if fails_early(r)]
+    if early:
+        text = f"Over the whole run the errors of {_named(early, everyone)} are inconsistent with the covariance (NEES)."
+        out.append(Point("Inconsistent at first", text, "bad"))
     return out
-
-
-def _claim(sign: int, factors: Sequence[float]) -> str:
-    if sign > 0:
-        return f"{_span(factors)} times as large as the covariance says: widen it, or find what the model leaves out"
-    if sign < 0:
-        return f"only {_span(factors)} times as large as the covariance says"
-    return "as large as the covariance says, as far as one run can tell"
 
 
 def _against(rows: Sequence[Row]) -> list[Point]:
@@ -164,13 +154,8 @@ def _against(rows: Sequence[Row]) -> list[Point]:
     if not wrong:
         return []
     parts = [f"those of {_named(found, rows)} {listed(tests)}" for tests, found in wrong.items()]
-    text = f"Innovations should be noise, but {'; '.join(parts)} (tests at the 5 % level)."
-    return [Point("Innovations are not noise", text, "bad")]
-
-
-def _span(factors: Sequence[float]) -> str:
-    ends = dict.fromkeys(number(v, 2) for v in (min(factors), max(factors)))
-    return " to ".join(ends)
+    text = f"Innovations should be white noise, but {'; '.join(parts)} (tests at the 5 % level)."
+    return [Point("Innovations are not white noise", text, "bad")]
 
 
 def _named(chosen: Sequence[Row], everyone: Sequence[Row]) -> str:
@@ -195,7 +180,7 @@ def _settling(comparison: Comparison, rows: Sequence[Row]) -> list[Point]:
     slow, sizes = [], []
     for r in rows:
         whole, late = r.rmse.get(group), r.rmse_last_half.get(group)
-        if whole is not None and late is not None and isfinite(whole) and whole > _SETTLING * late:
+        if whole is not None and late is not None and isfinite(whole) and whole > SETTLING * late:
             slow.append(r)
             sizes.append(whole)
     if not slow:
@@ -203,7 +188,7 @@ def _settling(comparison: Comparison, rows: Sequence[Row]) -> list[Point]:
     show = group_display(comparison, group)
     ends = dict.fromkeys(f"{number(v * show.factor, 3)}{show.suffix}" for v in (min(sizes), max(sizes)))
     text = f"Over the whole run the {group} error of {_named(slow, rows)} is {' to '.join(ends)} (RMS)"
-    return [Point("Not before it settles", f"{text}: do not use the first estimates{_settled(slow)}.", "bad")]
+    return [Point("Slow to converge", f"{text}: do not use the first estimates{_settled(slow)}.", "bad")]
 
 
 def _settled(rows: Sequence[Row]) -> str:
