@@ -249,6 +249,7 @@ def test_who_is_not_to_be_trusted_is_named_with_the_reason(comparison):
     failed = said(with_rows(comparison, success=False, message="the state left the planet"))
     assert failed["Did not succeed"] == "ekf: the state left the planet."
     assert "ekf" not in failed["Best in real time"]
+    assert said(with_rows(comparison, message="noise is near rounding"))["Note"] == "ekf: noise is near rounding."
 
 
 def with_nees(row, value: float, low: float = 3.0, high: float = 5.0):

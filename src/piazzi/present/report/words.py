@@ -118,6 +118,8 @@ def _more(others: Sequence[float], best: float) -> str:
 def _failed(rows: Sequence[Row]) -> list[Point]:
     failed = {r.estimator: r.message for r in rows if not r.success}
     out = [Point("Did not succeed", f"{name}: {message}.", "bad") for name, message in failed.items()]
+    remarks = {r.estimator: r.message for r in rows if r.success and r.message}
+    out += [Point("Note", f"{name}: {message}.") for name, message in remarks.items()]
     lost = [r for r in rows if r.success and r.diverged]
     if lost:
         out.append(
