@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from piazzi.estimate.substeps import choose_substeps, substep_error
     from piazzi.evaluate import Comparison, Observability, WindowTrade, compare, observability, windows
     from piazzi.kernels import (
+        ConstantAcceleration,
         Discrete,
         DormandPrince,
         DormandPrince5,
@@ -69,7 +70,10 @@ if TYPE_CHECKING:
 # name -> module; nothing is imported before it is used
 _WHERE = {
     **dict.fromkeys(("Model", "Parameter", "Sensor"), "piazzi.model"),
-    **dict.fromkeys(("Discrete", "DormandPrince", "DormandPrince5", "Euler", "Heun", "Integrator", "Kepler"), "piazzi.kernels"),
+    **dict.fromkeys(
+        ("ConstantAcceleration", "Discrete", "DormandPrince", "DormandPrince5", "Euler", "Heun", "Integrator", "Kepler"),
+        "piazzi.kernels",
+    ),
     **dict.fromkeys(("Midpoint", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Taylor"), "piazzi.kernels"),
     **dict.fromkeys(("Gaussian", "Manoeuvre", "Problem", "ProcessNoise", "Station", "Tracking", "Truth"), "piazzi.problem"),
     "with_gauss_markov": "piazzi.problem",
@@ -99,6 +103,7 @@ __all__ = [
     "BatchLeastSquares",
     "Cauchy",
     "Comparison",
+    "ConstantAcceleration",
     "Discrete",
     "DormandPrince",
     "DormandPrince5",

@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import pytest
 
+import piazzi as pz
 from piazzi import kernels
 from piazzi.kernels.integrators import Integrator
 from piazzi.scenarios.faults import Faults
@@ -29,6 +30,12 @@ def methods(kind=Integrator):
 
 def test_every_method_has_a_name():
     assert set(INTEGRATORS.values()) == set(methods())
+
+
+def test_the_founding_texts_step_goes_by_what_it_does_and_by_its_old_name():
+    assert pz.Taylor is pz.ConstantAcceleration
+    assert read({"method": "taylor", "substeps": 3}) == read({"method": "constant-acceleration", "substeps": 3})
+    assert write_integrator(pz.Taylor(3))["method"] == "constant-acceleration"
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)

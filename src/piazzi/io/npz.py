@@ -11,7 +11,7 @@ import numpy as np
 
 from piazzi.io.archive import read_arrays
 from piazzi.io.atomic import atomic_path
-from piazzi.kernels import Taylor
+from piazzi.kernels import ConstantAcceleration
 from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Tracking, Truth
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
 from piazzi.scenarios import load_scenario
@@ -56,7 +56,7 @@ def _problem(arrays: dict[str, Array]) -> Problem:
         process_noise=ProcessNoise(Q, "second", "scaled"),
         stations=[Station(station.name, station.sensor, R)],
         parameters=base.parameters,
-        integrator=Taylor(ceil(dt)),
+        integrator=ConstantAcceleration(ceil(dt)),
         prior_time=0.0,
         name=BASE,
     )
@@ -131,6 +131,7 @@ def _misfit(problem: Problem, tracking: Tracking) -> str:
     """What the founding layout has no place for, "" where it has one for everything."""
     base = load_scenario(BASE).problem
     noise, dt = problem.process_noise, _step(problem, tracking.times)
+    steps = ConstantAcceleration(ceil(dt or 1.0))
     faults = {
         f"its model is not that of {BASE}": problem.model != base.model or problem.parameters != base.parameters,
         "it has other than one station": len(problem.stations) != 1,
@@ -139,7 +140,7 @@ def _misfit(problem: Problem, tracking: Tracking) -> str:
         "its prior is not at the first epoch": problem.prior_time not in (None, 0.0),
         "its epochs are not k dt": dt is None,
         "it has more than one measurement at an epoch": len(tracking.row_times) != len(tracking.times),
-        f"its integrator is not {Taylor(ceil(dt or 1.0))}": problem.integrator != Taylor(ceil(dt or 1.0)),
+        f"its integrator is not {steps}": problem.integrator != steps,
         "its truth differs from its model": problem.truth is not None and not _is_plain(problem.truth),
     }
     return next((fault for fault, here in faults.items() if here), "")

@@ -1,7 +1,7 @@
 """Equations become compiled code."""
 
 from piazzi.kernels.cache import build_seconds, is_compiled, load
-from piazzi.kernels.integrators import Discrete, DormandPrince, Integrator, Kepler, Taylor
+from piazzi.kernels.integrators import ConstantAcceleration, Discrete, DormandPrince, Integrator, Kepler, Taylor
 from piazzi.kernels.library import Ready, ready
 from piazzi.kernels.runge_kutta import (
     DormandPrince5,
@@ -17,6 +17,7 @@ from piazzi.kernels.runge_kutta import (
 from piazzi.kernels.spec import KernelSpec
 
 __all__ = [
+    "ConstantAcceleration",
     "Discrete",
     "DormandPrince",
     "DormandPrince5",

@@ -141,12 +141,12 @@ def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
         return adaptive_source(model, *scheme[1:])
     if scheme[0] == "kepler":
         return kepler_source(model, *scheme[1:])
-    if scheme[0] == "taylor":
-        return _taylor_source(model)
+    if scheme[0] == "constant-acceleration":
+        return _constant_acceleration_source(model)
     return _map_source(model)
 
 
-def _taylor_source(model: Model) -> str:
+def _constant_acceleration_source(model: Model) -> str:
     """The step of the founding text; its derivative needs F of the rates alone, so it costs no more than they do."""
     d, (nxt, h) = derive(model), constant_acceleration_step(model)
     arguments, names, call = _arguments(model, ("h",))

@@ -79,7 +79,7 @@ class Integrator:
 
 
 @dataclass(frozen=True)
-class Taylor(Integrator):
+class ConstantAcceleration(Integrator):
     """Constant acceleration over a substep: x + h v + h^2/2 a, v + h a (Taylor and Gross, NAVIGATION 71(3), 2024).
 
     States whose rate is itself a state are taken to second order, all others to first.
@@ -87,7 +87,10 @@ class Taylor(Integrator):
 
     @property
     def scheme(self) -> tuple[Any, ...]:
-        return ("taylor",)
+        return ("constant-acceleration",)
+
+
+Taylor = ConstantAcceleration  # its other name, after the authors of the founding text
 
 
 @dataclass(frozen=True)

@@ -166,7 +166,7 @@ def jacobian(f: sp.Matrix, x: Sequence[sp.Symbol]) -> sp.Matrix:
 
 
 def constant_acceleration_step(model: Model) -> tuple[tuple[sp.Expr, ...], sp.Symbol]:
-    """One Taylor step of the founding text, and the symbol of its length.
+    """One step of constant acceleration, as in the founding text, and the symbol of its length.
 
     A state whose rate is itself a state (a position) is taken to second order, x + h v + h^2/2 dv/dt; every other to first
     order, v + h dv/dt.

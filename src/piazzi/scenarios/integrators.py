@@ -13,7 +13,8 @@ from piazzi.scenarios.table import Table
 from piazzi.units import Units
 
 INTEGRATORS: Mapping[str, type[Integrator]] = {
-    "taylor": kernels.Taylor,
+    "constant-acceleration": kernels.ConstantAcceleration,
+    "taylor": kernels.ConstantAcceleration,
     "euler": kernels.Euler,
     "midpoint": kernels.Midpoint,
     "heun": kernels.Heun,
