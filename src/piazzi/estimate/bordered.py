@@ -122,6 +122,10 @@ class BorderedSolver:
             c.report, float(damping),
         )  # fmt: skip
 
+    def of_constants(self) -> Array:
+        root = self.sigma[:, None] * self.inverse[self.nd :, self.nd :]
+        return np.asarray(root @ root.T)
+
     def marginals(self) -> Array:
         covariance, _ = self._covariances(keep_cross=False)
         self.chain.report[STEP_SMOOTHED] = self.chain.largest_step(covariance)

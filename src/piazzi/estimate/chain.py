@@ -220,6 +220,9 @@ class Solver(Protocol):
     def solve(self, damping: float) -> None:
         """Leave the Gauss-Newton (or damped) step in the chain's `dx`."""
 
+    def of_constants(self) -> Array:
+        """Covariance of the constants (C, C), after an undamped solve."""
+
     def marginals(self) -> Array:
         """Covariances of all states (K, n, n), after an undamped solve."""
 
@@ -274,6 +277,10 @@ class CovarianceSolver:
 
     def solve(self, damping: float) -> None:
         self.kernels.graph_solve.after(self._linearized, float(damping))
+
+    def of_constants(self) -> Array:
+        c = slice(len(self.chain.problem.model.moving), None)
+        return self.P_last[c, c]
 
     def marginals(self) -> Array:
         return self._marginals(np.empty((1, 1)), keep_cross=False)

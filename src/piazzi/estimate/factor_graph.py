@@ -15,6 +15,7 @@ from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate, View
 from piazzi.estimate.gauss_newton import Outcome
+from piazzi.estimate.joint_mode import applies, marginal, remark
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.losses import Cauchy, loss_of
 from piazzi.estimate.robust import RobustChain, chain_for, descend, gated_run, stand
@@ -26,6 +27,7 @@ from piazzi.problem.checks import Array, numeric
 from piazzi.problem.inputs import Inputs, prepare, with_prior_node
 
 STARTS = ("ekf", "prior", "window", "bank")
+CONSTANTS = ("joint", "marginal")
 SOLVERS = ("auto", "chain", "bordered")
 # iterations that a second solution may take before the first is kept
 CHALLENGE = 20
@@ -52,6 +54,11 @@ class FactorGraph:
         they hold.  "auto" decides, and ``details["solver"]`` tells.
     loss : Huber, Cauchy or Tukey, or "huber", "cauchy" or "tukey"; optional
         Rows that do not fit the others are weighted down; ``details["weights"]`` (J,) has the weight of each.
+    constants : "joint" or "marginal"
+        Estimated constants as the most probable path of everything together has them, or the most probable constants, whatever
+        the path (Laplace's approximation), with the most probable path for these; covariances are those of Gauss-Newton there.
+        The two differ by many sigmas where a constant multiplies states that process noise moves, over many epochs; a joint
+        mode that is off by more than half a sigma says so in `Estimate.message`.
 
     Notes
     -----
@@ -78,6 +85,7 @@ class FactorGraph:
     cross_covariances: bool = False
     solver: str = "auto"
     loss: Any = None
+    constants: str = "joint"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "loss", loss_of(self.loss))
@@ -85,6 +93,8 @@ class FactorGraph:
             raise ValueError(f"start is {self.start!r}; it must be one of {', '.join(STARTS)}, or states")
         if self.solver not in SOLVERS:
             raise ValueError(f"solver is {self.solver!r}; it must be one of {', '.join(SOLVERS)}")
+        if self.constants not in CONSTANTS:
+            raise ValueError(f"constants is {self.constants!r}; it must be one of {', '.join(CONSTANTS)}")
         if self.max_iterations < 1:
             raise ValueError(f"max_iterations is {self.max_iterations}; it must be 1 or more")
         if not self.tolerance > 0:
@@ -107,6 +117,8 @@ class FactorGraph:
         outcome, solver, used = self._optimize(chain, inputs, tracking)
         if self._bank is not None:
             outcome = search(self._bank, chain, solver, inputs, outcome, self.tolerance)
+        if not outcome.failure and applies(chain):
+            outcome = self._with_constants(chain, solver, outcome)
         nu, S = chain.innovations()
         details = {"start": used} | outcome.details | {"first_state": chain.x[0].copy(), "residuals": chain.residuals()}
         if isinstance(chain, RobustChain):
@@ -128,6 +140,14 @@ class FactorGraph:
             details,
             failure,
         )
+
+    def _with_constants(self, chain: Chain, solver: Solver, outcome: Outcome) -> Outcome:
+        """The outcome with its constants at the marginal mode, where that is asked for; else what is to be said about them."""
+        if self.constants == "marginal":
+            return marginal(chain, solver, outcome, self.max_iterations, self.tolerance)
+        told = [outcome.details.get("remark"), remark(chain, solver, outcome.covariance)]
+        said = "; ".join(filter(None, told))
+        return replace(outcome, details=outcome.details | {"remark": said}) if said else outcome
 
     @property
     def _bank(self) -> Bank | None:

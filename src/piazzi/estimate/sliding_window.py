@@ -66,6 +66,9 @@ class SlidingWindow:
     rows of the newest epoch are at first weighted by their innovation nu^T S^-1 nu, later by their residual alone, like all
     others: while little is known, a large innovation says nothing against a row.
 
+    Where an estimated constant multiplies states that process noise moves, windows of many states have the bias of the graph's
+    joint mode, which can be many sigmas; the filter, the smoother and ``FactorGraph(constants="marginal")`` have not.
+
     A direction that a wide prior left open, and that the measurements did not close, is named by the delayed estimate, which
     then is no success, as by the full graph.
     """
