@@ -17,11 +17,13 @@ ROOT = Path(__file__).resolve().parents[2]
 
 SOURCES = """
 import hashlib, numpy as np, piazzi as pz
+from piazzi.estimate.kalman import update_fragments
 from tests.laws.problems import b612, network, satellite
 from tests.model.test_definitions import NAMED, problem as with_definitions
 for problem in (satellite(), satellite(pz.RungeKutta4(2)), b612(), network(np.random.default_rng(0)), with_definitions(NAMED)):
     for backend in ("plain", "compiled"):
-        print(hashlib.sha256(problem.spec("transition", "filter").source(backend).encode()).hexdigest())
+        parts = ("transition", problem.noise_fragment, *update_fragments(problem, "auto"), "filter")
+        print(hashlib.sha256(problem.spec(*parts).source(backend).encode()).hexdigest())
 """
 
 
