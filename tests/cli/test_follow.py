@@ -1,6 +1,8 @@
 """`piazzi estimate SCENARIO --follow`: a tracker in a pipe, that survives bad lines and being killed."""
 
+import importlib
 import json
+import os
 import random
 import signal
 import subprocess
@@ -186,3 +188,213 @@ def trickle(stream, lines):
             time.sleep(0.001)
     except OSError:
         pass
+
+
+# ---- nothing is lost ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def rows(measurements, tmp_path):
+    """A file of 30 measurements."""
+    path = tmp_path / "rows.csv"
+    path.write_text("\n".join(measurements[2][:31]) + "\n")
+    return path
+
+
+@pytest.fixture(params=["name", "symlink", "hard link", "other way"])
+def alias(request, rows, tmp_path):
+    """The same file, by another name or not."""
+    other = tmp_path / "other.csv"
+    if request.param == "symlink":
+        other.symlink_to(rows)
+    elif request.param == "hard link":
+        other.hardlink_to(rows)
+    else:
+        (tmp_path / "folder").mkdir()
+        other = rows if request.param == "name" else tmp_path / "folder" / ".." / "rows.csv"
+    return other
+
+
+def test_a_stream_is_not_replaced_by_its_estimates(rows, alias, call):
+    before = rows.read_bytes()
+    for arguments in (("-o", alias), ("--checkpoint", alias)):
+        line = call("estimate", "b612-range", "--follow", rows, *arguments).refused()
+        assert f"{arguments[0]} {alias} and --follow {rows} are the same file" in line
+    assert rows.read_bytes() == before
+
+
+def test_nor_where_it_is_piped_in_or_out(rows, tmp_path):
+    before = rows.read_bytes()
+    with open(rows, "rb") as stream:
+        done = subprocess.run([*FOLLOW, "-", "-o", rows], stdin=stream, capture_output=True, text=True, timeout=HANGS)
+    assert done.returncode == 2
+    assert f"-o {rows} and standard input are the same file" in done.stderr
+    with open(rows, "ab") as sink:  # it would read what it writes, without end
+        done = subprocess.run([*FOLLOW, rows], stdout=sink, stderr=subprocess.PIPE, text=True, timeout=HANGS)
+    assert done.returncode == 2
+    assert f"standard output and --follow {rows} are the same file" in done.stderr
+    assert rows.read_bytes() == before
+
+
+def test_estimates_and_checkpoint_are_two_files(rows, tmp_path, call):
+    out, state = tmp_path / "x.csv", tmp_path / "k.csv"
+    for make in (lambda: None, lambda: out.write_text("old"), lambda: (state.unlink(missing_ok=True), state.symlink_to(out))):
+        make()
+        for same in {out, state if state.is_symlink() else out}:
+            line = call("estimate", "b612-range", "--follow", rows, "-o", out, "--checkpoint", same).refused()
+            assert f"-o {out} and --checkpoint {same} are the same file" in line
+        assert not out.exists() or out.read_text() == "old"
+
+
+def test_devices_may_be_given_twice(rows, call):
+    assert call("estimate", "b612-range", "--follow", rows, "-o", "/dev/stdout").status in (0, 2)  # a pipe or a file of pytest
+    assert call("estimate", "b612-range", "--follow", "/dev/null", "-o", "x.csv", "--checkpoint", "/dev/null").status == 2
+
+
+def test_another_stream_leaves_estimates_and_checkpoint_alone(rows, measurements, tmp_path, call):
+    """It begins as the one of the checkpoint did, and goes on otherwise: seen only where the checkpoint was made."""
+    out, state, lines = tmp_path / "o.csv", tmp_path / "k.npz", measurements[2]
+    command = ("estimate", "b612-range", "--follow", rows, "-o", out, "--checkpoint", state)
+    assert call(*command).status == 0
+    with open(out, "a") as file:
+        file.write("written after the last checkpoint\n")
+    before = out.read_bytes(), state.read_bytes()
+    rows.write_text("\n".join([*lines[:5], "0.45,11.25", *lines[6:40]]) + "\n")
+    assert "line 31: the stream is not the one that the checkpoint was made from" in call(*command).refused()
+    assert (out.read_bytes(), state.read_bytes()) == before
+    rows.write_text("nonsense\n")
+    assert call(*command).status == 2
+    rows.write_text("")
+    assert call(*command).status == 2
+    assert (out.read_bytes(), state.read_bytes()) == before
+
+
+@pytest.mark.parametrize("left", [1000, 0, None])
+def test_estimates_that_were_lost_are_told_and_not_padded(rows, measurements, tmp_path, call, left):
+    """As after a power failure: they were written before the checkpoint, and are not there."""
+    out, state = tmp_path / "o.csv", tmp_path / "k.npz"
+    command = ("estimate", "b612-range", "--follow", rows, "-o", out, "--checkpoint", state)
+    assert call(*command).status == 0
+    whole = out.read_bytes()
+    assert len(whole) > 1000
+    if left is None:
+        out.unlink()
+    else:
+        out.write_bytes(whole[:left])
+    kept = state.read_bytes()
+    line = call(*command).refused()
+    assert f"{out}: it has {left or 0:,} bytes, but {len(whole):,} were written before the checkpoint was made" in line
+    assert (out.read_bytes() if out.exists() else None) == (None if left is None else whole[:left])
+    assert state.read_bytes() == kept
+    out.write_bytes(whole)  # put back, it goes on
+    rows.write_text("\n".join(measurements[2]) + "\n")
+    assert call(*command).status == 0
+    assert out.read_bytes().startswith(whole)
+    assert out.read_bytes().count(b"\n") == 101
+
+
+def test_estimates_are_on_disk_before_the_checkpoint_that_knows_of_them(rows, tmp_path, call, monkeypatch):
+    """Whenever the power fails: no checkpoint is moved into place that knows of more than was synced."""
+    out, state, synced = tmp_path / "o.csv", tmp_path / "k.npz", [0]
+    sync, replace = os.fsync, os.replace
+
+    def seen_sync(handle):
+        sync(handle)
+        if os.path.exists(out) and os.path.samestat(os.fstat(handle), out.stat()):
+            synced.append(os.fstat(handle).st_size)
+
+    def seen_replace(source, target):
+        if Path(target).name == "k.npz":
+            with np.load(source) as archive:
+                assert int(archive["progress_written"]) == synced[-1] > 0
+        replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", seen_sync)
+    monkeypatch.setattr(os, "replace", seen_replace)
+    assert call("estimate", "b612-range", "--follow", rows, "-o", out, "--checkpoint", state).status == 0
+    assert synced[-1] == out.stat().st_size
+
+
+def test_an_interruption_in_the_middle_of_a_line_loses_no_line(rows, measurements, tmp_path, call, monkeypatch):
+    """Ctrl-C between a measurement and its estimate: the checkpoint is of before, so that the line is taken again."""
+    out, state, whole = tmp_path / "o.csv", tmp_path / "k.npz", tmp_path / "whole.csv"
+    assert call("estimate", "b612-range", "--follow", rows, "-o", whole).status == 0
+    command = ("estimate", "b612-range", "--follow", rows, "-o", out, "--checkpoint", state)
+    monkeypatch.setattr("piazzi.cli.follow.BETWEEN_CHECKPOINTS", 0.0)
+    for place in ("piazzi.io.rows.RowReader.read", "piazzi.estimate.live.LiveFilter.update", "piazzi.cli.sink.Sink.emit"):
+        for at in (3, 17):
+            out.unlink(missing_ok=True)
+            state.unlink(missing_ok=True)
+            with monkeypatch.context() as patch:
+                patch.setattr(place, interrupted_after(at, place))
+                assert call(*command).status == 130
+            assert call(*command).status == 0
+            assert out.read_bytes() == whole.read_bytes(), (place, at)
+
+
+def interrupted_after(calls, place):
+    """What is called there, but for a Ctrl-C after so many calls."""
+    module, kind, name = place.rsplit(".", 2)
+    real, count = getattr(getattr(importlib.import_module(module), kind), name), [0]
+
+    def call(*arguments):
+        count[0] += 1
+        out = real(*arguments)
+        if count[0] == calls:
+            raise KeyboardInterrupt
+        return out
+
+    return call
+
+
+def test_a_checkpoint_after_a_remark_is_gone_on_from(rows, measurements, tmp_path, call):
+    out, state, lines = tmp_path / "o.csv", tmp_path / "k.npz", measurements[2]
+    command = ("estimate", "b612-range", "--follow", rows, "-o", out, "--checkpoint", state)
+    rows.write_text("\n".join([*lines[:20], "# a pause", ""]) + "\n")
+    assert call(*command).status == 0
+    rows.write_text("\n".join([*lines[:20], "# a pause", "", *lines[20:]]) + "\n")
+    assert call(*command).status == 0
+    assert out.read_bytes().count(b"\n") == 101
+    with np.load(state) as archive:
+        assert archive["progress_lines"] == 103
+
+
+# ---- nothing is silently wrong ------------------------------------------------------------------------------------------
+
+CUBE = """
+states = { x = "m" }
+dynamics = { x = "x**3" }
+sensors.r.components = { range = "x" }
+stations = [{ name = "s", sensor = "r", noise = { sigma = 1 } }]
+prior = { mean = [1], sigma = [1] }
+times = { step = 0.01, count = 5 }
+"""
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+@pytest.mark.parametrize("estimator", ["ekf", "ukf", "srekf", "window:3"])
+def test_an_estimate_that_cannot_be_used_ends_it(tmp_path, call, estimator, as_json, monkeypatch):
+    """As the same lines do in a file, status 3; the last good checkpoint stays, and can be gone on from."""
+    monkeypatch.setattr("piazzi.cli.follow.BETWEEN_CHECKPOINTS", 0.0)
+    scenario, rows, state = tmp_path / "cube.toml", tmp_path / "rows.csv", tmp_path / "k.npz"
+    scenario.write_text(CUBE)
+    rows.write_text("time,range\n0,1\n0.1,1.1\n0.2,1.2\n3,4\n3.5,4\n")
+    command = ("estimate", scenario, "--with", estimator, "--follow", rows, "--checkpoint", state, *["--json"] * as_json)
+    done = call(*command)
+    assert done.status == 3
+    assert done.said == [
+        "piazzi: 3 measurements taken",
+        "piazzi: line 5: with s at t = 3 s, the estimate is not finite at t = 3 s (x)",
+    ]
+    assert "nan" not in done.out.lower()
+    assert "null" not in done.out
+    assert done.out.count("\n") == 4 - as_json
+    with np.load(state) as archive:
+        assert all(np.isfinite(archive[name]).all() for name in ("session_mean", "session_covariance"))
+    kept = state.read_bytes()
+    assert call(*command).status == 3  # the same lines again: the same end
+    assert state.read_bytes() == kept
+    rows.write_text("time,range\n0.25,1.2\n0.3,1.3\n")  # others: it goes on
+    done = call(*command)
+    assert (done.status, done.said) == (0, ["piazzi: 2 measurements taken"])
+    assert call("estimate", rows, "--scenario", scenario, "--with", estimator).status in (0, 3)

@@ -8,16 +8,16 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from piazzi.cli.output import check_place
-from piazzi.cli.running import DONE, say
+from piazzi.cli.running import DONE, NOT_ESTIMATED, say
+from piazzi.cli.sink import Sink
 from piazzi.cli.sources import STDIN
 
 if TYPE_CHECKING:
@@ -32,7 +32,8 @@ def follow(problem: Problem, estimator: Any, source: str, output: str | None, ch
     """Feed the lines of a file or of standard input to an estimator in progress; the exit status.
 
     A line that cannot be used is reported on stderr and skipped.  With a checkpoint file the run goes on where a killed one
-    stood: a stream that begins as before is skipped to that place, and a file given by -o is cut back to it.
+    stood: a stream that begins as before is skipped to that place, and a file given by -o is cut back to it.  An estimate that
+    cannot be used ends it: its line is not written, and the last checkpoint is left as it was.
     """
     if not callable(getattr(estimator, "start", None)):
         raise click.UsageError(
@@ -43,8 +44,8 @@ def follow(problem: Problem, estimator: Any, source: str, output: str | None, ch
     with ExitStack() as stack:
         stream: IO[bytes] = sys.stdin.buffer if source == STDIN else stack.enter_context(open(source, "rb"))
         run = _Run(problem, estimator.start(problem), fingerprint(problem, estimator), checkpoint, as_json)
-        run.resume()
-        run.sink = _sink(stack, output, run.written)
+        known = run.resume()
+        run.sink = stack.enter_context(closing(Sink(output, known)))
         try:
             run.consume(stream)
         except ValueError as error:
@@ -52,20 +53,9 @@ def follow(problem: Problem, estimator: Any, source: str, output: str | None, ch
         finally:
             run.save(force=True)
     say(run.summary())
-    return DONE
-
-
-def _sink(stack: ExitStack, output: str | None, written: int) -> IO[bytes]:
-    """Where estimates go: standard output, or a file cut back to what the checkpoint knows of."""
-    if output in (None, STDIN):
-        return sys.stdout.buffer
-    assert output is not None
-    file: IO[bytes] = stack.enter_context(Path(output).open("r+b" if os.path.exists(output) else "w+b"))  # noqa: SIM115 (the stack closes it)
-    file.truncate(written)
-    file.seek(0, os.SEEK_END)
-    if file.tell() < written:
-        raise ValueError(f"{output}: has {file.tell()} bytes, but the checkpoint was made after {written}")
-    return file
+    if run.failure:
+        say(run.failure)
+    return NOT_ESTIMATED if run.failure else DONE
 
 
 @dataclass
@@ -77,9 +67,8 @@ class _Run:
     mark: Any
     checkpoint: str | None
     as_json: bool
-    sink: IO[bytes] = field(default_factory=lambda: sys.stdout.buffer)
+    sink: Sink = field(default_factory=lambda: Sink(None))
     lines: int = 0
-    written: int = 0
     opening: bytes = b""
     skip: int = 0
     taken: int = 0
@@ -88,6 +77,10 @@ class _Run:
     bad: int = 0
     saved_at: float = 0.0
     resumed: bool = False
+    halfway: bool = False
+    failure: str = ""
+    reader: RowReader | None = None
+    first: list[bytes] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.consumed = hashlib.sha256()
@@ -95,77 +88,94 @@ class _Run:
 
     # ---- checkpoints ---------------------------------------------------------------------------------------------
 
-    def resume(self) -> None:
-        """Take up a checkpoint where there is one."""
+    def resume(self) -> int:
+        """Take up a checkpoint where there is one; how many bytes of estimates were written before it."""
         if self.checkpoint is None:
-            return
+            return 0
         from piazzi.io.checkpoint import read_checkpoint
 
         check_place(self.checkpoint)
         if not os.path.exists(self.checkpoint):
-            return
+            return 0
         session, progress = read_checkpoint(self.checkpoint, self.mark, self.session.saved_names)
         try:
             self.session.restore(session)
         except ValueError as error:
             raise ValueError(f"{self.checkpoint}: {error}") from None
-        self.skip, self.written = progress.lines, progress.written
-        self.expected, self.opening = progress.consumed, progress.opening
+        self.skip, self.expected, self.opening = progress.lines, progress.consumed, progress.opening
         self.resumed = True
+        return progress.written
 
     def save(self, force: bool = False) -> None:
-        """Write the checkpoint, unless one was written just now."""
-        now = time.monotonic()
-        if self.checkpoint is None or self.skip or not self.lines or not (force or now - self.saved_at > BETWEEN_CHECKPOINTS):
+        """Write the checkpoint, unless one was written just now, or a line is taken only by halves."""
+        due = force or time.monotonic() - self.saved_at > BETWEEN_CHECKPOINTS
+        if self.checkpoint is None or self.skip or not self.lines or self.halfway or self.failure or not due:
             return
         from piazzi.io.checkpoint import Progress, write_checkpoint
 
-        progress = Progress(self.lines, self.written, self.consumed.digest(), self.opening)
-        write_checkpoint(self.checkpoint, self.mark, self.session.checkpoint(), progress)
+        try:
+            session = self.session.checkpoint()
+        except ValueError as error:
+            self.failure = f"line {self.lines}: {error}; it cannot be kept"
+            return
+        self.sink.sync()  # first, so that no checkpoint knows of more than is there
+        progress = Progress(self.lines, self.sink.written, self.consumed.digest(), self.opening)
+        write_checkpoint(self.checkpoint, self.mark, session, progress)
         self.saved_at = time.monotonic()
 
     # ---- the stream ----------------------------------------------------------------------------------------------
 
     def consume(self, stream: IO[bytes]) -> None:
         """Every line in turn."""
-        from piazzi.io.rows import RowReader
-
-        reader: RowReader | None = None
-        first: list[bytes] = []
         for line in _lines(stream):
+            self.halfway = True
             self.lines += 1
             self.consumed.update(line)
-            if not line.strip() or line.startswith(b"#"):
-                continue
-            if len(first) < 2:
-                first.append(line)
-                self._recognise(first)
-            if reader is None:
-                reader = RowReader.begin(self.problem, line.rstrip(b"\r\n"), self.lines)
-                self._begin_output()
-            elif not self._skipped():
-                self._take(reader, line)
-        if reader is None:
+            empty = not line.strip() or line.startswith(b"#")
+            if not empty:
+                self._recognise(line)
+            known = self._known()
+            if not empty:
+                self._read(line, known)
+            self.halfway = False
+            self.save()
+            if self.failure:
+                return
+        if self.reader is None:
             raise ValueError("there are no measurements: not even a line that names the columns")
+        if not self.skip:
+            self.sink.begin()
 
-    def _recognise(self, first: list[bytes]) -> None:
+    def _recognise(self, line: bytes) -> None:
         """By its header and first measurement, whether this is the stream of the checkpoint, to be skipped as far as it got."""
-        if len(first) < 2:
+        if len(self.first) == 2:
             return
-        opening = hashlib.sha256(b"".join(first)).digest()
-        if self.skip and opening != self.opening:
-            self.skip = 0  # a stream that goes on: all of it is new
-        self.opening = opening
+        self.first.append(line)
+        if len(self.first) == 2:
+            opening = hashlib.sha256(b"".join(self.first)).digest()
+            if self.skip and opening != self.opening:
+                self.skip = 0  # a stream that goes on: all of it is new
+            self.opening = opening
 
-    def _skipped(self) -> bool:
-        if self.lines < self.skip:
-            return True
+    def _known(self) -> bool:
+        """Whether the checkpoint was made after this line; raises ValueError at its last one if others came before."""
+        if not self.skip:
+            return False
         if self.lines == self.skip:
             self.skip = 0
             if self.consumed.digest() != self.expected:
                 raise ValueError(f"line {self.lines}: the stream is not the one that the checkpoint was made from")
-            return True
-        return False
+        return True
+
+    def _read(self, line: bytes, known: bool) -> None:
+        """A line with something in it: the header, or a measurement, of which a known one was taken before."""
+        from piazzi.io.rows import RowReader
+
+        if self.reader is None:
+            self.reader = RowReader.begin(self.problem, line.rstrip(b"\r\n"), self.lines)
+            self._begin_output()
+        elif not known:
+            self._take(self.reader, line)
 
     def _take(self, reader: RowReader, line: bytes) -> None:
         try:
@@ -179,34 +189,29 @@ class _Run:
             text = str(error)
             say((text if text.startswith("line ") else f"line {self.lines}: {text}") + "; skipped")
             return
+        if not self.session.success:
+            self.failure = f"line {self.lines}: with {row.station} at t = {row.time:g} s, {self.session.message}"
+            return
         self.taken += 1
         if getattr(self.session, "rejected", False):
             self.rejected += 1
             say(f"line {self.lines}: {row.station} at t = {row.time:g} s is beyond the gate; rejected")
         self._write(row)
-        self.save()
 
     # ---- estimates -----------------------------------------------------------------------------------------------
 
     def _begin_output(self) -> None:
         if not self.as_json and not self.resumed:
             names = self.problem.model.names
-            self._emit(",".join(["time", *names, *("sigma_" + n for n in names)]))
+            self.sink.emit(",".join(["time", *names, *("sigma_" + n for n in names)]))
 
     def _write(self, row: Row) -> None:
-        sigma = np.sqrt(np.maximum(np.diagonal(self.session.covariance), 0.0))
+        sigma = np.sqrt(np.diagonal(self.session.covariance)).tolist()
         mean, t = self.session.mean.tolist(), float(self.session.time)
         if self.as_json:
-            values = {"time": t, "station": row.station, "mean": mean, "sigma": sigma.tolist()}
-            self._emit(json.dumps({k: _finite(v) for k, v in values.items()}, allow_nan=False))
+            self.sink.emit(json.dumps({"time": t, "station": row.station, "mean": mean, "sigma": sigma}, allow_nan=False))
         else:
-            self._emit(",".join(repr(v) for v in [t, *mean, *sigma.tolist()]))
-
-    def _emit(self, text: str) -> None:
-        data = (text + "\n").encode()
-        self.sink.write(data)
-        self.sink.flush()
-        self.written += len(data)
+            self.sink.emit(",".join(repr(v) for v in [t, *mean, *sigma]))
 
     def summary(self) -> str:
         """What became of the lines."""
@@ -219,13 +224,6 @@ class _Run:
 
 def _counted(number: int, what: str) -> str:
     return f"{number} {what}{'s' * (number != 1)}"
-
-
-def _finite(value: Any) -> Any:
-    """NaN and infinity as None."""
-    if isinstance(value, list):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _lines(stream: IO[bytes]) -> Iterator[bytes]:

@@ -9,6 +9,8 @@ from typing import Any, TypeVar
 
 import click
 
+from piazzi.cli.places import check_places
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -45,11 +47,18 @@ def output(what: str) -> Callable[[F], F]:
 
 
 class Command(click.Command):
-    """A command whose docstring may have a paragraph of examples, which keeps its lines in the help."""
+    """A command whose docstring may have a paragraph of examples, which keeps its lines in the help.
+
+    Before it runs, the files that it was given are found to be different ones.
+    """
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         self.help = keep_examples(self.help)
         super().format_help_text(ctx, formatter)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        check_places(ctx.params)
+        return super().invoke(ctx)
 
 
 class Group(click.Group):
