@@ -36,7 +36,8 @@ def test_a_recording_is_not_replaced_by_what_comes_of_it(recording, call, monkey
         getattr(same, link)(source)
     before = source.read_bytes()
     line = call(*command[:-1], same).refused()
-    assert f"-o {same} and SOURCE {command[1]} are the same file" in line
+    argument = "SCENARIO" if command[0] == "study" else "SOURCE"
+    assert f"-o {same} and {argument} {command[1]} are the same file" in line
     assert source.read_bytes() == before
 
 

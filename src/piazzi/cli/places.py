@@ -23,10 +23,8 @@ def check_places(given: Mapping[str, Any]) -> None:
         Where a file that is written is one that is read, or is written twice, by whatever names.
     """
     sources = given.get("sources") or (given.get("source"),)
-    read = [("SOURCE", s, 0) for s in sources] + [
-        ("--scenario", given.get("scenario"), 0),
-        ("--follow", given.get("follow"), 0),
-    ]
+    scenario = "--scenario" if {"source", "sources"} & given.keys() else "SCENARIO"
+    read = [*(("SOURCE", s, 0) for s in sources), (scenario, given.get("scenario"), 0), ("--follow", given.get("follow"), 0)]
     output = given.get("output_file")
     printed = given.get("follow") is not None and output is None  # estimates of a stream come while it is read
     written = [("-o", STREAM if printed else output, 1), ("--checkpoint", given.get("checkpoint"), 1)]
