@@ -76,9 +76,41 @@ def test_a_flipped_bit_is_found(path):
     data = bytearray(path.read_bytes())
     data[-5] ^= 1
     path.write_bytes(data)
-    log = Log.open(path)
+    with pytest.warns(UserWarning, match="1 record damaged; 6 runs are whole"):
+        log = Log.open(path)
     assert [entry.task.first for entry in log.entries] == [0, 3]
     log.close()
+    assert path.with_name(path.name + ".damaged").read_bytes() == bytes(data)
+
+
+def test_the_last_record_is_no_exception(path):
+    """A bit of it flips anywhere: it is told and a copy kept, but where it looks as if it was never written to its end."""
+    log = Log.open(path)
+    last = log.entries[-1].offset
+    log.close()
+    whole = path.read_bytes()
+    for at in (0, 7, 20, 47, 48, 60, len(whole) - last - 1):
+        data = bytearray(whole)
+        data[last + at] ^= 0x10
+        path.write_bytes(data)
+        with pytest.warns(UserWarning, match="1 record damaged; 6 runs are whole"):
+            Log.open(path).close()
+    for tail in (whole[last:-1], whole[last : last + 20], whole[last : last + 3], b"\0" * 500):
+        path.write_bytes(whole[:last] + tail)
+        Log.open(path).close()  # without a word: these runs were never said to be kept
+        assert path.read_bytes() == whole[:last]
+
+
+def test_a_copy_that_could_not_be_made_is_not_spoken_of(path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    data = bytearray(path.read_bytes())
+    data[-5] ^= 1
+    path.write_bytes(data)
+    monkeypatch.setattr(shutil, "copyfile", full)
+    with pytest.warns(UserWarning, match=r"\(no copy could be made: No space left on device\)"):
+        Log.open(path).close()
 
 
 @pytest.mark.filterwarnings("default:.*record damaged:UserWarning")

@@ -8,6 +8,8 @@ import sys
 from contextlib import suppress
 from typing import IO
 
+from piazzi.io.atomic import sync_folder
+
 STDOUT = "-"
 
 
@@ -62,6 +64,7 @@ class Sink:
             self._check(found.st_size)
             file.truncate(self.written)
             file.seek(0, os.SEEK_END)
+            sync_folder(path)
         return file
 
     def _check(self, size: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import shutil
@@ -9,6 +10,7 @@ import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 
 
@@ -16,7 +18,9 @@ from pathlib import Path
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary name in the folder of `path`, moved to `path` when the block ends well, and removed when it does not.
 
-    A link is followed; a device (/dev/null) is written to, not replaced; a pipe is refused, because nobody may read it.
+    A link is followed; a device (/dev/null) is written to, not replaced; a pipe is refused, because nobody may read it.  Owner
+    and permissions of the file that is replaced stay; one with other hard links, or of an owner that the new one cannot be
+    given, is written into in place.  What killed writers of `path` left behind goes.
 
     Raises
     ------
@@ -26,7 +30,9 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     check_writable(path)
     special = _is_special(path)
     target = Path(path if special else os.path.realpath(path))
-    work = _temporary(target) if special else _beside(target)
+    if not special:
+        _sweep(str(target), os.getpid())
+    work, handle = _temporary(target) if special else _beside(target)
     try:
         with _told(path, work):
             yield work
@@ -38,6 +44,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     finally:
         with suppress(FileNotFoundError):
             work.unlink()
+        if handle is not None:
+            os.close(handle)  # with its lock
 
 
 @contextmanager
@@ -51,14 +59,46 @@ def _told(path: str | os.PathLike[str], work: Path) -> Iterator[None]:
         raise OSError(error.errno, error.strerror, os.fspath(path)) from error
 
 
-def sweep(path: str | os.PathLike[str]) -> None:
-    """Remove what writers of `path` left behind that were killed; only for who knows that nobody else is writing it."""
-    target = Path(os.path.realpath(path))
-    name = re.compile(re.escape(f".{target.stem[:40]}-") + r"[a-z0-9_]{8}" + re.escape(target.suffix[-40:]))
-    for leftover in target.parent.glob(".*"):
-        if name.fullmatch(leftover.name):
+@lru_cache(maxsize=1000)
+def _sweep(path: str, process: int) -> None:
+    """Remove what killed writers of `path` left behind, once in a process: files of ours that no living process has locked."""
+    target = Path(path)
+    name = re.compile(re.escape(_prefix(target)) + r"[0-9a-f]{8}" + re.escape(target.suffix[-40:]))
+    with suppress(OSError), os.scandir(target.parent) as found:
+        for leftover in [entry.path for entry in found if entry.name.startswith(".") and name.fullmatch(entry.name)]:
             with suppress(OSError):
-                leftover.unlink()
+                _remove_dead(leftover)
+
+
+def _remove_dead(leftover: str) -> None:
+    """Remove a temporary file that nobody is writing."""
+    handle = os.open(leftover, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+    try:
+        if _lock(handle, wait=False) and os.fstat(handle).st_uid == os.geteuid():
+            os.unlink(leftover)  # while it is locked: who has just made it finds it gone, and makes another
+    finally:
+        os.close(handle)
+
+
+def _lock(handle: int, wait: bool) -> bool:
+    """Whether a file is locked for this process now; never where the system or the file system has no such locks."""
+    try:
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+def sync_folder(path: str | os.PathLike[str]) -> None:
+    """Make a new name survive a power failure, where the system can."""
+    with suppress(OSError, AttributeError):
+        folder = os.open(Path(path).parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -73,6 +113,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         raise IsADirectoryError(f"cannot write {name}: it is a folder")
     elif not target.parent.is_dir():
         raise FileNotFoundError(f"cannot write {name}: there is no folder {target.parent}")
+    elif target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(f"cannot write {name}: it is read-only")
     elif not os.access(target.parent, os.W_OK | os.X_OK):
         raise PermissionError(f"cannot write {name}: no permission to write in {target.parent}")
 
@@ -82,30 +124,75 @@ def _is_special(path: str | os.PathLike[str]) -> bool:
     return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
 
 
-def _temporary(target: Path) -> Path:
+def _prefix(target: Path) -> str:
+    """How the names of temporary files beside a file begin: as nobody else's do."""
+    return f".{target.stem[:40]}.piazzi-"
+
+
+def _temporary(target: Path) -> tuple[Path, None]:
     """A new, private file with the same ending."""
     handle, name = tempfile.mkstemp(suffix=target.suffix[-40:])
     os.close(handle)
-    return Path(name)
+    return Path(name), None
 
 
-def _beside(target: Path) -> Path:
+def _beside(target: Path) -> tuple[Path, int | None]:
     """A new file in the same folder: private if it is to replace one, else with the permissions of all new files there.
 
-    It gets those by being opened as any file is: to ask for the mask is to change it for a moment, in all threads.
+    It gets those by being opened as any file is: to ask for the mask is to change it for a moment, in all threads.  The handle
+    has it locked for as long as it is open, which says that this process lives; None where there are no such locks.
     """
     mode = 0o600 if target.exists() else 0o666
     while True:
-        work = target.with_name(f".{target.stem[:40]}-{os.urandom(4).hex()}{target.suffix[-40:]}")
+        work = target.with_name(f"{_prefix(target)}{os.urandom(4).hex()}{target.suffix[-40:]}")
         with suppress(FileExistsError):
-            os.close(os.open(work, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
-            return work
+            handle = os.open(work, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode)
+            if not _lock(handle, wait=True):
+                os.close(handle)
+                return work, None
+            if os.fstat(handle).st_nlink:
+                return work, handle
+            os.close(handle)  # removed as one of a dead process, before it was locked
 
 
 def _settle(work: Path, target: Path) -> None:
-    """Give the finished file the permissions of the one it replaces, if it does, and move it there."""
-    if target.exists():
-        os.chmod(work, stat.S_IMODE(target.stat().st_mode))
+    """Put the finished file in the place of the one that it replaces, if it does, with its owner, permissions and links."""
     with open(work, "rb+") as file:
         os.fsync(file.fileno())
+    old = target.stat() if target.exists() else None
+    if old is not None and not (old.st_nlink == 1 and _like(work, old)):
+        _write_through(work, target)
+        return
     os.replace(work, target)
+    sync_folder(target)
+
+
+def _like(work: Path, old: os.stat_result) -> bool:
+    """Give a file the owner and the permissions of another, but no rights to run as its owner; whether that can be done."""
+    new = work.stat()
+    try:
+        if (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
+            os.chown(work, old.st_uid, old.st_gid)
+    except (OSError, AttributeError):
+        return False
+    os.chmod(work, old.st_mode & 0o777)
+    return True
+
+
+def _write_through(work: Path, target: Path) -> None:
+    """Copy the finished file into the other one, after room for it was made: it has names or an owner of its own."""
+    with open(work, "rb") as source, open(target, "r+b") as sink:
+        size, old = os.fstat(source.fileno()).st_size, os.fstat(sink.fileno())
+        try:
+            if size > old.st_size and hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(sink.fileno(), 0, size)
+        except OSError as error:
+            if error.errno in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+                sink.truncate(old.st_size)
+                raise
+        if old.st_mode & 0o7000:
+            os.chmod(target, old.st_mode & 0o777)
+        shutil.copyfileobj(source, sink)
+        sink.truncate()
+        sink.flush()
+        os.fsync(sink.fileno())

@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from piazzi.io.atomic import check_writable, sweep
+from piazzi.io.atomic import check_writable
 from piazzi.study.log import ENDING, Log
 from piazzi.study.plan import Study
 from piazzi.study.pool import Here, Processes, Workers, processors
@@ -73,7 +73,6 @@ def run_study(
             Runner(study, log, team, chunk, progress).run()
         finally:
             team.close()
-        sweep(store)  # the log is locked, so nobody else writes this store
         write_store(store, study, log)
         log.remove()
     finally:

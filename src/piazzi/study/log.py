@@ -18,6 +18,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from piazzi.io.atomic import sync_folder
 from piazzi.study.schema import check_body, check_record
 from piazzi.study.tasks import Piece, Task
 
@@ -56,7 +57,7 @@ class Log:
             with suppress(OSError):
                 path.unlink()
             raise
-        _settle_folder(path)
+        sync_folder(path)
         return log
 
     @classmethod
@@ -83,6 +84,7 @@ class Log:
             if found is None:
                 behind = _behind(file, end)
                 if behind is None:
+                    damaged += not _is_torn(file, end)
                     break
                 damaged += 1
                 end = file.seek(behind)  # its runs are missing, so they are computed again
@@ -212,13 +214,26 @@ def _behind(file: IO[bytes], start: int) -> int | None:
         at += found + 1
 
 
+def _is_torn(file: IO[bytes], start: int) -> bool:
+    """Whether what is left from `start` on is a record that was not written to its end, or nothing at all."""
+    file.seek(start)
+    head, left = file.read(_HEAD.size), os.fstat(file.fileno()).st_size - start
+    if len(head) < _HEAD.size:
+        return _MAGIC.startswith(head[: len(_MAGIC)]) or not any(head)
+    magic, length, _ = _HEAD.unpack(head)
+    return not any(head) or (magic == _MAGIC and length > left - _HEAD.size)
+
+
 def _keep_copy(path: Path, damaged: int, kept: int) -> None:
     """A copy of a damaged file beside it, before its runs are computed again, and a line that says so."""
     copy = path.with_name(path.name + ".damaged")
-    with suppress(OSError):
+    try:
         shutil.copyfile(path, copy)
+        kept_at = f"copy: {copy.name}"
+    except OSError as error:
+        kept_at = f"no copy could be made: {error.strerror}"
     records = f"{damaged} record{'s' * (damaged > 1)}"
-    text = f"{path}: {records} damaged; {kept} runs are whole, the others are computed again (copy: {copy.name})"
+    text = f"{path}: {records} damaged; {kept} runs are whole, the others are computed again ({kept_at})"
     warnings.warn(text, stacklevel=2)
 
 
@@ -266,13 +281,3 @@ def _lock_exclusively(file: IO[bytes]) -> None:
             file.seek(0)
         return
     fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-def _settle_folder(path: Path) -> None:
-    """Make the new name survive a power failure."""
-    with suppress(OSError, AttributeError):
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
