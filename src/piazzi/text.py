@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 LONGEST = 500
+_FORMULA = re.compile(r"'*[=+\-@\t\r]")
+_GUARDED = re.compile(r"'+[=+\-@\t\r]")
 
 
 def printable(text: str) -> str:
     """The text with control characters written out, so that nothing in it steers a terminal."""
     return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def unformulated(text: str) -> str:
+    """The text as a cell that no spreadsheet takes for a formula: behind an apostrophe where it would; see `restored`."""
+    return f"'{text}" if _FORMULA.match(text) else text
+
+
+def restored(cell: str) -> str:
+    """The text of which `unformulated` made this cell; any other cell as it is."""
+    return cell[1:] if _GUARDED.match(cell) else cell
 
 
 def one_line(text: str, longest: int = LONGEST) -> str:

@@ -30,6 +30,32 @@ def test_the_filter_gives_the_whole_run_bit_for_bit(bearings, estimator):
     assert live.time == tracking.times[-1]
 
 
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        pz.ExtendedKalmanFilter(),
+        pz.ExtendedKalmanFilter("joint"),
+        pz.ExtendedKalmanFilter("components"),
+        pz.ExtendedKalmanFilter(iterations=3),
+        pz.ExtendedKalmanFilter(gate=0.99),
+    ],
+    ids=str,
+)
+def test_the_filter_gives_the_bits_of_the_whole_run_for_stations_of_different_sensors_too(estimator):
+    """With two stations at every epoch, an estimated constant, integrated noise, and a prior before the first epoch."""
+    problem, _ = pz.load("template")
+    tracking = pz.simulate(problem, np.cumsum(np.random.default_rng(8).uniform(0.05, 0.4, 60)), np.random.default_rng(9))
+    whole, live = estimator.estimate(problem, tracking), estimator.start(problem)
+    assert whole.success, whole.message
+    for k, t in enumerate(tracking.times):
+        for row in range(tracking.first_row[k], tracking.first_row[k + 1]):
+            name = str(tracking.row_stations[row])
+            width = len(problem.stations[problem.station_index(name)].noise)
+            live.update(name, tracking.values[row, :width], t)
+        assert_array_equal(live.mean, whole.mean[k])
+        assert_array_equal(live.covariance, whole.covariance[k])
+
+
 @pytest.mark.parametrize(("lag", "iterations"), [(1, 1), (10, 1), (5, 3), (100, 1)])
 def test_the_window_gives_the_whole_run_bit_for_bit(bearings, lag, iterations):
     problem, tracking = bearings

@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import piazzi as pz
 from piazzi.io import cells, save
 from piazzi.io.csv import read_csv, write_csv
+from piazzi.text import restored, unformulated
 from tests.references.drawn import FLOATS, TEXT, problems, same_bits, same_tracking, trackings
 
 QUIET = settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
@@ -236,10 +237,15 @@ def test_every_double_survives(tmp_path):
         ("time,station,range\n0,west,1\n1,,1\n", "line 3: the station has no name"),
         ("time,station,range\n0,west,1\n1,north,1\n", "line 3: range is 1, but station 'north' measures bearing"),
         ("time,station,range\n0,west,1\n1,west,-inf\n", "line 3: range is -inf; leave the cell empty"),
-        ("time,station,range\n0,west,\n1,west,\n", "every value is missing"),
+        ("time,station,range,range_rate\n0,west,,\n1,west,,\n", "every value is missing"),
         ('time,station,range\n0,"west,1\n1,west,1\n', "line"),
         ('time,station,range\n0,we"st,1\n', "unknown station"),
         ("time,station,range,truth:x\n0,west,1,1\n", "the truth has no column 'truth:v'"),
+        ("time,station,range\n0,west,1\n", "there is no column 'range_rate', which station 'west' measures: add it"),
+        (
+            "time,station,range,range_rate,truth:x,truth:v\n0,west,1,,1,2\n1,west,1,,1,-inf\n",
+            "line 3: truth:v is -inf; leave the cell empty where it is not known",
+        ),
         (b"time,station,range\n0,west,1\n1,w\xffst,1\n", "line 3: it is not UTF-8 text: byte 0xff"),
         (b"time,station,range\n0,west,\0\n", "it is not text"),
         (b"PK\3\4\0\0\0", "it is not text"),
@@ -311,3 +317,37 @@ def lines_of_python(work):
     finally:
         sys.settrace(before)
     return count
+
+
+def test_a_station_that_is_not_in_the_file_needs_no_columns(tmp_path):
+    """And one that is may have empty ones."""
+    tracking = read(tmp_path, "time,station,bearing\n0,north,0.25\n")
+    assert_array_equal(tracking.values, [[0.25, np.nan]])
+    tracking = read(tmp_path, "time,station,range,range_rate\n0,west,1,\n")
+    assert_array_equal(tracking.values, [[1, np.nan]])
+
+
+HOSTILE = ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "'=1", "''@x", "'plain", "it's", "\t=1", "\r=1", "'", "=", "''"]
+
+
+def test_no_station_is_a_formula_and_all_are_read_back(tmp_path):
+    names = [name for name in HOSTILE if name.strip() == name]
+    model = pz.Model(["x"], ["0"], [pz.Sensor("ruler", ["x"])])
+    problem = pz.Problem(model, pz.Gaussian(0, 1), None, [pz.Station(name, "ruler", 1) for name in names])
+    tracking = pz.Tracking(np.arange(len(names)), np.full(len(names), -1.5), names)
+    write_csv(tmp_path / "a.csv", problem, tracking)
+    rows = [row.split(",") for row in (tmp_path / "a.csv").read_text().splitlines()]
+    assert not [row[1] for row in rows if row[1].strip('"')[0] in "=+-@\t\r"]
+    assert {row[2] for row in rows[1:]} == {"-1.5"}  # numbers stay numbers
+    assert same_tracking(read_csv(tmp_path / "a.csv", problem), tracking)
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_what_is_written_for_spreadsheets_is_undone(name):
+    assert restored(unformulated(name)) == name
+    assert unformulated(name)[:1] not in ("=", "+", "-", "@", "\t", "\r")
+
+
+@given(st.text(alphabet="'=+-@\t\rab1", max_size=6))
+def test_cells_of_different_names_differ(name):
+    assert restored(unformulated(name)) == name

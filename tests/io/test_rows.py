@@ -14,7 +14,7 @@ from tests.io.test_csv import ALONE, GOOD, PROBLEM, read
         ("time,station,range,range_rate,bearing", "0.5,north,,,0.25", "north", 0.5, [0.25]),
         ("time,station,bearing", "0.5,north,0.25", "north", 0.5, [0.25]),  # nothing that the first station measures
         ("bearing [deg],time [min],station", "90,2,north", "north", 120.0, [np.pi / 2]),
-        ("station,range,time", "west,1,0", "west", 0.0, [1, np.nan]),
+        ("station,range,range_rate,time", "west,1,,0", "west", 0.0, [1, np.nan]),
     ],
 )
 def test_any_header_of_a_file_will_do(header, line, station, time, values):

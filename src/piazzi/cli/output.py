@@ -128,10 +128,9 @@ def _cell(value: Any) -> Any:
     """Text that nothing is hidden in, and that no spreadsheet takes for a formula; anything else as it is."""
     if not isinstance(value, str):
         return value
-    from piazzi.text import printable
+    from piazzi.text import printable, unformulated
 
-    text = printable(value)
-    return f"'{text}" if text[:1] in ("=", "+", "-", "@") else text
+    return unformulated(printable(value))
 
 
 def beside() -> Console:

@@ -95,7 +95,7 @@ class LiveFilter(Session):
     """An extended Kalman filter in progress, from ``ExtendedKalmanFilter().start(problem)``.
 
     ``predict(t)`` moves to a time, ``update(station, z)`` takes a measurement there; several updates at one time are one epoch,
-    linearised at the prediction.  The same numbers as ``estimate`` on the whole run.
+    linearised at the prediction.  The numbers of ``estimate`` on the whole run, bit for bit.
 
     Attributes
     ----------

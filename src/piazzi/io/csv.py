@@ -16,7 +16,7 @@ from piazzi.io.atomic import atomic_path
 from piazzi.io.cells import STATION, Cells, read_cells
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, backwards, check_span
-from piazzi.text import nearest
+from piazzi.text import nearest, restored, unformulated
 from piazzi.units import Unit, Units
 
 if TYPE_CHECKING:
@@ -32,9 +32,10 @@ def read_csv(path: str | os.PathLike[str], problem: Problem) -> Tracking:
     """The measurements in a file, of a problem's stations.
 
     The first line names the columns: ``time``, ``station`` (not needed where there is one), the components of the sensors,
-    and, where the truth is known, ``truth:`` and a state.  Empty cells are missing values.  Numbers are in SI and radians
-    (in the model's own units, where one made in Python names others), or in the unit that a column names, as in
-    ``bearing [deg]``, which must be of the column's kind.
+    and, where the truth is known, ``truth:`` and a state.  Empty cells are missing values; columns that a station in the file
+    needs may be empty, but not absent.  A name behind an apostrophe, as spreadsheets are kept from formulas, is that name.
+    Numbers are in SI and radians (in the model's own units, where one made in Python names others), or in the unit that a
+    column names, as in ``bearing [deg]``, which must be of the column's kind.
 
     Raises
     ------
@@ -62,7 +63,8 @@ def write_csv(path: str | os.PathLike[str], problem: Problem, tracking: Tracking
     station, values = tracking.stations_of(problem), tracking.padded(problem.model.width)
     header, columns = [TIME], [_written(tracking.row_times)]
     if tracking.row_stations is not None:
-        header, columns = [*header, STATION], [*columns, np.asarray(tracking.row_stations).tolist()]
+        cells = {name: unformulated(str(name)) for name in dict.fromkeys(np.asarray(tracking.row_stations).tolist())}
+        header, columns = [*header, STATION], [*columns, [cells[name] for name in np.asarray(tracking.row_stations).tolist()]]
     for name, column in _components(problem, station, values).items():
         header, columns = [*header, name], [*columns, _written(column)]
     if tracking.truth is not None:
@@ -123,7 +125,7 @@ def _components(problem: Problem, station: Array, values: Array) -> dict[str, Ar
 
 
 def _in_own_units(cells: Cells, problem: Problem) -> Cells:
-    """The same table with the units of its column names taken into account."""
+    """The same table with the units of its column names taken into account, and names without what keeps them from formulas."""
     numbers: dict[str, Array] = {}
     for name, column in cells.numbers.items():
         match = _UNIT.fullmatch(name)
@@ -132,7 +134,7 @@ def _in_own_units(cells: Cells, problem: Problem) -> Cells:
             raise ValueError(f"two columns are called {label!r}")
         with np.errstate(over="ignore"):
             numbers[label] = column if factor == 1.0 else column * factor
-    return Cells(cells.comments, numbers, cells.station, cells.station_names, cells.lines)
+    return Cells(cells.comments, numbers, cells.station, tuple(map(restored, cells.station_names)), cells.lines)
 
 
 def _factor(column: str, label: str, text: str, problem: Problem) -> float:
@@ -187,13 +189,24 @@ def _tracking(cells: Cells, problem: Problem) -> Tracking:
     _check_times(cells, times)
     station = _stations(cells, problem)
     values = _values(cells, problem, station)
+    _check_components(cells, problem, station)
     names: Any = None if cells.station is None else np.array(cells.station_names)[cells.station]
     first = np.flatnonzero(np.append(True, times[1:] > times[:-1]))
     states = problem.model.names
     known = TRUTH + states[0] in cells.numbers
-    truth = np.column_stack([cells.numbers[TRUTH + s][first] for s in states]) if known else None
+    truth = np.column_stack([_true(cells, s)[first] for s in states]) if known else None
     epoch = next((c.removeprefix(EPOCH) for c in cells.comments if c.startswith(EPOCH)), "")
     return Tracking(times, values, names, truth, epoch)
+
+
+def _true(cells: Cells, state: str) -> Array:
+    """The column of a state's truth; ValueError, with the line, for an infinite value."""
+    column = cells.numbers[TRUTH + state]
+    bad = np.flatnonzero(np.isinf(column))
+    if bad.size:
+        value = column[bad[0]]
+        raise ValueError(f"line {cells.lines[bad[0]]}: {TRUTH}{state} is {value}; leave the cell empty where it is not known")
+    return column
 
 
 def _check_columns(cells: Cells, problem: Problem) -> None:
@@ -213,6 +226,16 @@ def _check_columns(cells: Cells, problem: Problem) -> None:
         raise ValueError(f"the truth has no column {absent[0]!r}")
     if cells.station is None and len(problem.stations) > 1:
         raise ValueError(f"there is no column {STATION!r}; the problem has {', '.join(s.name for s in problem.stations[:20])}")
+
+
+def _check_components(cells: Cells, problem: Problem, station: Array) -> None:
+    """Refuse a table without the column of a component that one of its stations measures; an empty one will do."""
+    for s in np.unique(station).tolist():
+        place = problem.stations[s]
+        for name in problem.model.sensor(place.sensor).components:
+            if name not in cells.numbers:
+                who = f"which station {place.name!r} measures"
+                raise ValueError(f"there is no column {name!r}, {who}: add it, empty where nothing was measured")
 
 
 def _check_times(cells: Cells, times: Array) -> None:
