@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
-from piazzi.estimate.soundness import defect
+from piazzi.estimate.soundness import defect, semidefinite
 
 LIVE = {
     "ekf": pz.ExtendedKalmanFilter(),
@@ -105,3 +105,27 @@ def test_singular_covariances_can_be_used():
         assert defect(np.zeros((1, 4)), ((P + P.T) / 2)[None], "abcd", lambda k: "here") == ""
     bad = np.diag([1.0, 1.0, 1.0, -1e-3])
     assert defect(np.zeros((2, 4)), np.array([np.eye(4), bad]), "abcd", lambda k: f"at {k}").endswith("at 1")
+
+
+@pytest.mark.parametrize("sigma", [1.0, 1e-100, 1e150])
+@pytest.mark.parametrize("pair", [2e-10, 1e-8, 1e-6])
+def test_a_covariance_is_semidefinite_by_the_least_eigenvalue_of_its_correlations(sigma, pair):
+    """Two values correlated by more than one, and two that are one value but differ by `pair` in what they say of a third."""
+    scale = np.array([sigma, 1.0, 1.0])
+    beyond = np.eye(3)
+    beyond[0, 1] = beyond[1, 0] = 1 + pair
+    differing = np.eye(3)
+    differing[0, 1] = differing[1, 0] = 1.0
+    differing[0, 2] = differing[2, 0] = 2 * np.sqrt(pair)
+    for correlations in (beyond, differing):
+        least = np.linalg.eigvalsh(correlations)[0]
+        found = semidefinite((correlations * np.outer(scale, scale))[None])[0]
+        assert found == (least >= -1e-9 * 3), least
+
+
+def test_what_is_known_for_certain_is_correlated_with_nothing():
+    certain = np.diag([0.0, 1.0])
+    assert semidefinite(certain[None])[0]
+    certain[0, 1] = certain[1, 0] = 1e-6
+    assert not semidefinite(certain[None])[0]
+    assert not semidefinite(np.diag([-1e-300, 1.0])[None])[0]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate.soundness import semidefinite
+from piazzi.estimate.soundness import lowest_eigenvalues, semidefinite
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, numeric
 
@@ -67,8 +67,7 @@ class Saved:
             pair = f"({names[i]}, {names[j]}) is {P[i, j]:g} and ({names[j]}, {names[i]}) is {P[j, i]:g}"
             raise ValueError(f"{what} is not symmetric: {pair}")
         if not semidefinite(P[None])[0]:
-            unit = np.where(scale > 0, scale, 1.0)
-            lowest = np.linalg.eigvalsh(P / unit).min()
+            lowest = lowest_eigenvalues(P[None])[0]
             raise ValueError(
                 f"{what} is not positive semidefinite: the smallest eigenvalue of its correlations is {lowest:.3g}"
             )

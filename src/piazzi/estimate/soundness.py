@@ -8,6 +8,9 @@ import numpy as np
 
 from piazzi.problem.checks import Array
 
+INDEFINITE = 1e-9  # times n: an eigenvalue of correlations further below zero is none of rounding
+LEAST = 1e-300  # variances below have no digits left to be judged by
+
 
 def defect(
     mean: Array, covariance: Array, names: Sequence[str], where: Callable[[int], str], what: str = "the estimate"
@@ -40,20 +43,18 @@ def _is_definite(mean: Array, covariance: Array) -> bool:
         return False
 
 
-def semidefinite(P: Array, tolerance: float = 1e-8) -> Array:
-    """For each of the covariances (K, n, n), whether it is positive semidefinite up to rounding, (K,).
+def semidefinite(P: Array) -> Array:
+    """For each of the covariances (K, n, n), whether it is positive semidefinite up to rounding, (K,)."""
+    sound = (np.diagonal(P, axis1=1, axis2=2) >= 0).all(axis=1) & (lowest_eigenvalues(P) >= -INDEFINITE * P.shape[1])
+    return np.asarray(sound)
 
-    Elimination without pivoting on the correlation matrices, all epochs at once.
-    """
-    sigma = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2), 0.0))
-    unit = np.where(sigma > 0, sigma, 1.0)
-    C = P / (unit[:, :, None] * unit[:, None, :])
-    good = (np.diagonal(P, axis1=1, axis2=2) >= 0).all(axis=1)
-    for j in range(P.shape[1]):
-        pivot = C[:, j, j]
-        column = C[:, j + 1 :, j]
-        firm = pivot > tolerance
-        good &= (pivot >= -tolerance) & (firm | (np.abs(column) <= 10 * np.sqrt(tolerance)).all(axis=1))
-        step = np.where(firm, 1.0 / np.where(firm, pivot, 1.0), 0.0)
-        C[:, j + 1 :, j + 1 :] -= column[:, :, None] * column[:, None, :] * step[:, None, None]
-    return np.asarray(good)
+
+def lowest_eigenvalues(P: Array) -> Array:
+    """The smallest eigenvalue of the correlations of each covariance (K, n, n), minus infinity where it has none, (K,)."""
+    with np.errstate(all="ignore"):
+        sigma = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2), LEAST))
+        correlations = P / sigma[:, :, None] / sigma[:, None, :]
+    there = np.isfinite(correlations).all(axis=(1, 2))
+    lowest = np.full(len(P), -np.inf)
+    lowest[there] = np.linalg.eigvalsh(correlations[there])[:, 0]
+    return lowest
