@@ -330,6 +330,27 @@ def wide(base: Base, seed: str, tally: Tally) -> None:
                 wrong = off(view, reference, epochs) if view.success else ""
                 if wrong:
                     tally.note(f"{who}: {wrong}", f"{seed} {parts}\n{estimator}")
+    wide_live(good, reference, tally, f"{seed} {parts}")
+
+
+def wide_live(good: Base, reference: tuple[Array, Array], tally: Tally, how: str) -> None:
+    """The same problem one measurement at a time."""
+    for estimator in (pz.ExtendedKalmanFilter(), pz.SquareRootKalmanFilter(), pz.SlidingWindow(lag=3)):
+        who = f"{type(estimator).__name__}.live"
+        tally.judged[who] += 1
+        try:
+            session = estimator.start(good.problem)
+        except ValueError as error:  # too wide for it, which it says
+            one_line(error)
+            continue
+        for k, (t, z) in enumerate(zip(good.tracking.times, good.tracking.values, strict=True)):
+            session.update("s", z, float(t))
+            told = Belief(session.mean[None], session.covariance[None], session.success, session.message)
+            wrong = off(told, tuple(part[k : k + 1, k : k + 1] for part in reference), 1) if told.success else ""
+            if wrong:
+                tally.note(f"{who}: {wrong}", how)
+                break
+        tally.right[who] += session.success
 
 
 def off(view: Any, reference: tuple[Array, Array], until: int) -> str:

@@ -1,5 +1,7 @@
 """Priors up to 1e22 times as wide as the noise, in variance: every estimator against 100 digits, or it says that it cannot."""
 
+import copy
+
 import mpmath as mp
 import numpy as np
 import pytest
@@ -131,3 +133,28 @@ def test_studies_filter_wide_priors_one_by_one(tmp_path):
     plan = pz.Study(wide, np.arange(float(K)), {"ekf": pz.ExtendedKalmanFilter()}, runs=40, seed=1)
     line_of_ekf = plan.run(tmp_path / "wide.nc", workers=0).summary.lines[0]
     assert line_of_ekf.mean_nees == pytest.approx(2.0, abs=0.6)  # of 2 values: a mean over 40 runs of 12 epochs
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "estimator",
+    [pz.ExtendedKalmanFilter(), pz.ExtendedKalmanFilter(gate=0.999), pz.SlidingWindow(lag=3), pz.SquareRootKalmanFilter()],
+    ids=["ekf", "gate", "window", "square root"],
+)
+def test_live_estimates_are_right_or_say_that_they_are_not(case, estimator):
+    problem, tracking = line(*CASES[case])
+    means, covariances = exact(problem, tracking, list(range(K)))
+    session = estimator.start(problem)
+    for k, (t, z) in enumerate(zip(tracking.times, tracking.values, strict=True)):
+        session.update("s", z, float(t))
+        sigma = np.sqrt(np.diag(covariances[k]))
+        mean_off = np.abs(session.mean - means[k]) / sigma - 4e-16 * np.abs(means[k]) / sigma
+        right = mean_off.max() < 1e-4 and np.abs(np.sqrt(np.diag(session.covariance)) / sigma - 1).max() < 1e-4
+        assert right or not session.success
+    if case != "1e8" and not isinstance(estimator, pz.SquareRootKalmanFilter):
+        assert "the prior is too wide for covariances" in session.message and "SquareRootKalmanFilter" in session.message
+        assert copy.copy(session).message == session.message
+        with pytest.raises(ValueError, match="too wide"):
+            session.checkpoint()
+    else:
+        assert session.success

@@ -126,6 +126,7 @@ class GuardedLiveFilter(LiveFilter):
             self.covariance,
             nu,
             S,
+            self.widest,
         )
         self.innovation[:], self.innovation_covariance[:] = nu[-1], S[-1]
         self.rejected, self._measured = bool(rejected[-1]), True

@@ -11,6 +11,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.saved import Saved
 from piazzi.estimate.session import Session
+from piazzi.estimate.width import told
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, check_span
 from piazzi.problem.inputs import unresolved
@@ -104,9 +105,11 @@ class LiveFilter(Session):
     mean, covariance : (n,), (n, n)
         The current belief: predicted, or updated.  The arrays are reused: copy what you keep.
     innovation, innovation_covariance : (m,), (m, m), of the last update
-    success, message : whether the belief is finite with a semidefinite covariance; else why not
+    success, message : whether the belief is finite with a semidefinite covariance, and the prior not too wide for one beside
+        the noise; else why not
     """
 
+    _shown: ClassVar[tuple[str, ...]] = (*Session._shown, "widest")
     saved_names: ClassVar[tuple[str, ...]] = (
         "base_mean",
         "base_covariance",
@@ -130,6 +133,7 @@ class LiveFilter(Session):
         self._x_pred, self._P_pred = problem.mean.copy(), problem.covariance.copy()
         self._d, self._P = np.zeros(n), problem.covariance.copy()
         self.innovation, self.innovation_covariance = np.full(m, np.nan), np.full((m, m), np.nan)
+        self.widest = np.zeros(1)  # largest predicted variance of a measurement so far, in units of its noise
         self._times, self._count, self._which = np.zeros(4), np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
         self._times[3] = problem.prior_time or 0.0  # measurements before any prediction are at the time of the prior
         self._row, self._predicted_to, self._measured = np.full(m, np.nan), problem.prior_time, False
@@ -161,6 +165,7 @@ class LiveFilter(Session):
             self.covariance,
             self.innovation,
             self.innovation_covariance,
+            self.widest,
         )
 
     @property
@@ -216,6 +221,9 @@ class LiveFilter(Session):
     def _beliefs(self) -> list[tuple[Array, Array]]:
         predicted = (self._base_mean, self._base_covariance), (self._x_pred, self._P_pred)
         return [(self.mean, self.covariance), *predicted, (self._d, self._P)]
+
+    def _doubt(self) -> str:
+        return told(self.widest)
 
     def _kept(self) -> dict[str, Array]:
         stand = [np.nan if v is None else v for v in (self._clock.time, self._predicted_to)]

@@ -15,6 +15,7 @@ from piazzi.estimate.robust_window import row_space, window_fragments
 from piazzi.estimate.saved import MOST_STEPS, Saved, check_order, check_steps
 from piazzi.estimate.session import Session
 from piazzi.estimate.stretch import Stretch
+from piazzi.estimate.width import told
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
@@ -41,10 +42,11 @@ class LiveWindow(Session):
     refused : list of (time, station)
     innovation, innovation_covariance : (m,), (m, m)
         Of the last row taken in; NaN before the first, and after one that came late, of which the window keeps none.
-    success, message : whether the beliefs of the window and before it are finite with semidefinite covariances; else why not
+    success, message : whether the beliefs of the window and before it are finite with semidefinite covariances, and the prior
+        not too wide for them beside the noise; else why not
     """
 
-    _shown: ClassVar[tuple[str, ...]] = ("refused",)
+    _shown: ClassVar[tuple[str, ...]] = ("refused", "widest")
 
     saved_names = (
         *("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before"),
@@ -67,6 +69,7 @@ class LiveWindow(Session):
         self._newest = problem.mean.copy(), problem.covariance.copy()
         self._row, self._pending = np.full(m, np.nan), None
         self.innovation, self.innovation_covariance = np.full(m, np.nan), np.full((m, m), np.nan)
+        self.widest = np.zeros(1)  # largest predicted variance of a measurement so far, in units of its noise
         self._window = Stretch(n, m)
         self._span, self._unread = np.zeros(2, dtype=np.int64), np.zeros((2, n, n))
         self._bind()
@@ -251,6 +254,7 @@ class LiveWindow(Session):
             self._newest_covariance,
             self._nu,
             self._S,
+            self.widest,
         )
 
     # ---- checkpoints ---------------------------------------------------------------------------------------------
@@ -264,6 +268,9 @@ class LiveWindow(Session):
         if len(window):
             found += [(window.x[window.first], self._oldest_covariance[window.first])]
         return found + [(x, self.covariance) for x in window.x[window.first : window.stop]]
+
+    def _doubt(self) -> str:
+        return told(self.widest)
 
     def _kept(self) -> dict[str, Array]:
         window, out = self._window, {"m": self._m.copy(), "P": self._P.copy(), **self._window.copied()}

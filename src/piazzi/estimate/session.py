@@ -19,7 +19,8 @@ class Session(ABC):
 
     Attributes
     ----------
-    success, message : whether every belief is finite with a semidefinite covariance; else why not.  Looked at when asked for
+    success, message : whether every belief is finite with a semidefinite covariance, and no measurement so far found a state
+        so open that covariances lose what it leaves; else why not.  Looked at when asked for
     """
 
     problem: Problem
@@ -57,7 +58,12 @@ class Session(ABC):
         means, covariances = zip(*self._beliefs(), strict=True)
         t = self._stands
         place = "" if t is None else f"at t = {t:g} s"
-        return defect(np.array(means), np.array(covariances), self.problem.model.names, lambda k: place).rstrip()
+        found = defect(np.array(means), np.array(covariances), self.problem.model.names, lambda k: place).rstrip()
+        return found or self._doubt()
+
+    def _doubt(self) -> str:
+        """Why beliefs that look good cannot be used, "" where they can."""
+        return ""
 
     def checkpoint(self) -> dict[str, Array]:
         """Everything that the next call depends on, as arrays; `restore` takes it back.

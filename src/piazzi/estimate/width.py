@@ -21,6 +21,12 @@ TOO_WIDE = "the prior is too wide for covariances"
 RESTLESS = "the bordered form does not apply, because process noise or a manoeuvre moves an estimated constant"
 
 
+def told(widest: Array) -> str:
+    """Why a live estimate on covariances cannot be used, "" unless a measurement had more than `DIFFUSE` times its noise."""
+    way = "begin with SquareRootKalmanFilter().start(problem), or estimate the whole run"
+    return f"{TOO_WIDE} beside the noise of the measurements: {way}" if widest[0] > DIFFUSE else ""
+
+
 def too_wide(problem: Problem, inputs: Inputs, S: Array) -> bool:
     """Whether innovation covariances (J, m, m) of a filter stand further above the noise than covariances can tell."""
     least = np.diagonal(problem.station_noise, axis1=1, axis2=2)

@@ -75,6 +75,7 @@ symmetric: Any
 absorb: Any
 decorrelate: Any
 record: Any
+note_width: Any
 update_epoch: Any
 # written in fragments/noise_*.py, linearize.py, chain.py
 linearize_dynamics: Any

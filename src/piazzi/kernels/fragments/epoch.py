@@ -15,6 +15,15 @@ def record(row, nu, H, P, R, at, innovation, innovation_covariance):
 
 
 @inline
+def note_width(row, R, at, innovation_covariance, widest):
+    """Keep the largest predicted variance of a component that is there, in units of its noise."""
+    for i in range(M):
+        s = innovation_covariance[(row * M + i) * M + i]
+        if not isnan(s):
+            widest[0] = maximum(widest[0], s / R[at + i * M + i])
+
+
+@inline
 def update_epoch(
     first, last, t, x, P, p, z, station, sensor, numbers, R, correlated, nu, H, work, innovation, innovation_covariance
 ):

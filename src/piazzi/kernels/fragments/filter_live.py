@@ -30,12 +30,14 @@ def live_update(
     covariance: Array,
     innovation: Array,
     innovation_covariance: Array,
+    widest: Array,
 ) -> None:
     nu, H, work = scratch(M), scratch(MN), scratch(WORK)
     s = which[0]
     x = load_vector(x_pred, 0, N)
     innovate(sensor[s], clock[3], x, p, numbers, s * NUMBERS, z, 0, nu, H, 0)
     record(0, nu, H, load_matrix(P_pred, 0, N, N), R, s * M * M, innovation, innovation_covariance)
+    note_width(0, R, s * M * M, innovation_covariance, widest)
     d_new, P_new = absorb(load_vector(d, 0, N), load_matrix(P, 0, N, N), nu, H, R, s * M * M, correlated[s], work)
     store(d, 0, d_new)
     store(P, 0, P_new)

@@ -23,6 +23,7 @@ def live_update_guarded(
     covariance: Array,
     innovation: Array,
     innovation_covariance: Array,
+    widest: Array,
 ) -> None:
     nu, H, work = scratch(M), scratch(MN), scratch(WORK)
     x, P = update_epoch_guarded(
@@ -47,5 +48,8 @@ def live_update_guarded(
         innovation,
         innovation_covariance,
     )
+    for row in range(rows):
+        if rejected[row] == 0:
+            note_width(row, R, station[row] * M * M, innovation_covariance, widest)
     store(mean, 0, x)
     store(covariance, 0, symmetric(P))

@@ -70,6 +70,7 @@ def live_settle(
     covariance: Array,
     innovation: Array,
     innovation_covariance: Array,
+    widest: Array,
 ) -> None:
     a, k = span[0], span[1]
     nu_row, H_row = scratch(M), scratch(MN)
@@ -110,4 +111,6 @@ def live_settle(
         innovation,
         innovation_covariance,
     )
+    for row in range(first_row[k], first_row[k + 1]):
+        note_width(row, R, station[row] * M * M, innovation_covariance, widest)
     store(covariance, 0, P_new)
