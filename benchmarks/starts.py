@@ -7,7 +7,7 @@ trajectory of six hours stays above the Earth's radius, 6.378e6 m; other draws a
 
 A run ends consistent where it succeeds and its NEES at five epochs (0, 1/4, 1/2, 3/4 of the run, and the end) is below the
 chi-square quantile of 4 degrees of freedom at 1 - 0.01/5 (16.92): a matched linear estimator passes in at least 99 % of runs,
-however its errors hang together in time.  The share by the final state alone (99 % quantile, 13.28) stands beside it.
+however its errors are correlated in time.  The share by the final state alone (99 % quantile, 13.28) stands beside it.
 Then the same for B612 with a prior that allows both directions round: how often the true one is the mode called most probable.
 """
 

@@ -33,13 +33,13 @@ def test_a_recording_of_the_founding_layout_has_its_planet(call, tmp_path):
 
 def test_windows_and_observability_write_reports_and_join_one(call, tmp_path):
     assert call("windows", "b612-range", "--lags", "1,5", "--no-graph", "--report", tmp_path / "w").status == 0
-    assert "How long a window has to be" in (tmp_path / "w" / "report.html").read_text()
+    assert "Window length" in (tmp_path / "w" / "report.html").read_text()
     assert call("observability", "b612-range-q0", "--no-twins", "--report", tmp_path / "o.html").status == 0
-    assert "What can be seen" in (tmp_path / "o.html").read_text()
+    assert "<h3>Observability" in (tmp_path / "o.html").read_text()
     joined = call("report", "b612-range", "--with", "ekf", "--windows", "1,5", "--observability", "-o", tmp_path / "all.html")
     assert joined.status == 0
     text = (tmp_path / "all.html").read_text()
-    assert "How long a window has to be" in text and "What can be seen" in text
+    assert "Window length" in text and "<h3>Observability" in text
     assert "whole numbers" in call("report", "b612-range", "--windows", "few", "-o", tmp_path / "x.html").refused()
 
 

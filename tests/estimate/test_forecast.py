@@ -152,5 +152,5 @@ def test_an_estimate_that_failed_is_not_carried_forward():
     model = pz.Model(["x"], ["-1"], [pz.Sensor("depth", ["log(x)"])])
     problem = pz.Problem(model, pz.Gaussian(1.0, 1e-6), None, pz.Station("buoy", "depth", 1e6), integrator=pz.RungeKutta4(1))
     estimate = pz.ExtendedKalmanFilter().estimate(problem, pz.Tracking([0.0, 0.5, 2.0], [0.0, 0.0, 0.0]))
-    with pytest.raises(ValueError, match="nothing can be carried forward: the estimate is not finite from epoch 2"):
+    with pytest.raises(ValueError, match="nothing can be propagated: the estimate is not finite from epoch 2"):
         estimate.predict(3.0)

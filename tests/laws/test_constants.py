@@ -191,7 +191,7 @@ def test_failed_estimate_with_considered_parameters_predicts_nothing(monkeypatch
     tracking = pz.simulate(b612(), np.arange(5) * 0.1, np.random.default_rng(0))
     failed = pz.FactorGraph(max_iterations=1).estimate(problem, tracking)
     assert not failed.success
-    with pytest.raises(ValueError, match=r"nothing can be carried forward: .*not converged"):
+    with pytest.raises(ValueError, match=r"nothing can be propagated: .*not converged"):
         failed.predict([1.0])
 
 

@@ -108,7 +108,7 @@ def test_a_filter_that_is_lost_with_any_steps_is_told_of():
     tracking = pz.Tracking(np.arange(50) * 0.5, 100 * rng.standard_normal(50))
     said = step_warning(oscillator(10), tracking)
     assert re.fullmatch(
-        r"the estimate is lost, with steps of any length: half of its innovations are beyond (\S+) sigma; .*", said
+        r"the estimate diverges with steps of any length: half of its innovations are beyond (\S+) sigma; .*", said
     )
     own = pz.simulate(replace(oscillator(1), truth=None, integrator=pz.RungeKutta4(10)), tracking.times, rng)
     assert "too long" in step_warning(replace(oscillator(1), integrator=pz.Euler(1)), own)

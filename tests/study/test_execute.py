@@ -84,7 +84,7 @@ def test_other_studies_stores_are_refused(whole, tmp_path):
         run_study(study, expected, workers=0)
     with pytest.raises(KeyboardInterrupt):
         run_study(study, tmp_path / "s.nc", workers=0, chunk=8, progress=_interrupt_after(8))
-    with pytest.raises(ValueError, match="was not finished: --resume goes on with it"):
+    with pytest.raises(ValueError, match="was not finished: --resume continues it"):
         run_study(study, tmp_path / "s.nc", workers=0)
     with pytest.raises(ValueError, match="has runs of another study: seed is 0 there and 5 here"):
         run_study(small(runs=60, vary={"R.scale": [1, 4]}, seed=5), tmp_path / "s.nc", workers=0, resume=True)

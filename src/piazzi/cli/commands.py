@@ -45,7 +45,7 @@ def piazzi() -> None:
       piazzi compare b612-range --with ekf --with graph
       piazzi windows tracking.npz               how long a window has to be
       piazzi observability b612-range-q0        what can be seen, and how well
-      piazzi report tracking.npz -o page.html   a page to hand to somebody
+      piazzi report tracking.npz -o page.html   a self-contained interactive page
       piazzi scenarios list                     what is built in
 
     Exit status: 0 done, 2 bad usage or input, 3 an estimator did not succeed.

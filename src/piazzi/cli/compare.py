@@ -35,9 +35,9 @@ def command(
 ) -> int:
     """Compare several estimators on SOURCE.
 
-    Shows errors, honesty and cost side by side.  RMSE is the root of the mean squared length of the error; the last half
-    shows what is left once an estimator has settled.  NEES and NIS measure honesty: near the ideal, errors are as large as
-    the covariance says; above it, larger.
+    Shows errors, consistency and cost side by side.  RMSE is the root of the mean squared length of the error; the last
+    half shows what is left once an estimator has converged.  NEES and NIS measure consistency: near the ideal, errors are as
+    large as the covariance predicts; above it, larger.
 
     Examples:
       piazzi compare tracking.npz

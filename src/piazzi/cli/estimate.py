@@ -30,10 +30,10 @@ ENDINGS = (".json", ".csv", ".npz", ".nc")
     "--predict",
     "ahead",
     metavar="AHEAD",
-    help="How far to carry the last state forward, and with what doubt: 2h, or 10min,1d, or 1d/1h for every hour of a day.",
+    help="Propagate the last state this far and report its uncertainty: 2h; 10min,1d; 1d/1h (hourly for a day).",
 )
 @click.option("--follow", metavar="FILE", help="Read measurements as lines of CSV from FILE, - for stdin, as they come.")
-@click.option("--checkpoint", metavar="FILE", help="With --follow: where to keep the state, and to go on from.")
+@click.option("--checkpoint", metavar="FILE", help="With --follow: file that the state is saved in, and resumed from.")
 def command(
     source: str,
     names: tuple[str, ...],
@@ -103,7 +103,7 @@ def _follow(
 
 
 def predicted(comparison: Comparison, ahead: str) -> dict[str, Forecast]:
-    """Every estimate's last state carried forward; one that is not finite has none."""
+    """Every estimate's last state propagated; one that is not finite has none."""
     import numpy as np
 
     from piazzi.cli.ahead import times_ahead

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @click.command(cls=options.Command)
 @options.source
-@click.option("--add", "added", metavar="STATION", multiple=True, help="A station more, repeatable; see the examples.")
+@click.option("--add", "added", metavar="STATION", multiple=True, help="Additional station; may be repeated; see the examples.")
 @click.option("--no-twins", is_flag=True, help="Do not look for other first states with the same measurements.")
 @options.output("Write all of it as .json, or the growth over time as .csv; - is JSON on stdout.")
 @options.as_json
@@ -33,13 +33,13 @@ def command(
     scenario: str | None,
     report: str | None,
 ) -> int:
-    """Tell what can be known of the first state in SOURCE.
+    """Analyse the observability of the first state in SOURCE.
 
     What the measurements say about it without the prior: singular values of the Fisher information in prior sigmas,
-    Cramer-Rao bounds of every state, the direction seen worst, and other first states that give the same measurements; where
-    the truth is known, whether observability, linearisation or such a twin is what limits estimators.  --add tells what a
-    further station would change: one of the problem's once more, a new one with a sensor of the model and its numbers, or one
-    with an equation of its own; SI units and radians.
+    Cramer-Rao bounds of every state, the least observable direction, and other first states that give the same
+    measurements (twins); where the truth is known, whether observability, linearisation or a twin is what limits estimators.
+    --add shows what an additional station would change: one of the problem's once more, a new one with a sensor of the model
+    and its numbers, or one with an equation of its own; SI units and radians.
 
     Examples:
       piazzi observability b612-range-q0

@@ -31,13 +31,17 @@ def number(text: str) -> float:
 source = click.argument("source", metavar="SOURCE")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, and nothing else there.")
 seed = click.option("--seed", type=WholeNumber(0), metavar="N", default=0, show_default=True, help="Seed of simulation.")
-scenario = click.option("--scenario", metavar="NAME", help="Scenario that a .csv or the CSV on standard input measures.")
+scenario = click.option("--scenario", metavar="NAME", help="Scenario that defines the problem for CSV input.")
 
 
 def estimators(default: str) -> Callable[[F], F]:
     """Option --with, repeatable; `default` is what runs without it."""
     return click.option(
-        "--with", "names", metavar="ESTIMATOR", multiple=True, help=f"Estimator, repeatable; see below.  [default: {default}]"
+        "--with",
+        "names",
+        metavar="ESTIMATOR",
+        multiple=True,
+        help=f"Estimator, may be repeated; see below.  [default: {default}]",
     )
 
 

@@ -1,4 +1,4 @@
-"""``piazzi report``: a page to hand to somebody."""
+"""``piazzi report``: a self-contained interactive page."""
 
 from __future__ import annotations
 
@@ -28,9 +28,13 @@ def _lags(context: click.Context, parameter: click.Parameter, text: str | None) 
     "-o", "--output", "output_file", metavar="FILE", default="report.html", show_default=True, help="The page, .html."
 )
 @click.option(
-    "--windows", "lags", metavar="N,N,...", callback=_lags, help="Add what windows of so many states, such as 10,50,200, do."
+    "--windows",
+    "lags",
+    metavar="N,N,...",
+    callback=_lags,
+    help="Also compare sliding windows of these lengths, e.g. 10,50,200.",
 )
-@click.option("--observability", "seen", is_flag=True, help="Add what can be seen of the first state.")
+@click.option("--observability", "seen", is_flag=True, help="Also analyse the observability of the first state.")
 @options.seed
 @options.scenario
 def command(

@@ -27,13 +27,13 @@ ENDINGS = (".nc", ".csv", ".npz")
     "--tolerance",
     type=options.number,
     metavar="SIGMA",
-    help="Choose the substeps: their error moves no estimate by more standard deviations.",
+    help="Choose the substeps: their error moves no estimate by more than this many standard deviations.",
 )
 @click.option(
     "--truth", type=click.Choice(("fixed", "drawn")), help="Where the truth starts: at one place, or drawn from the prior."
 )
 @click.option("--perfect-guess", is_flag=True, help="The prior's mean is the true first state (-o FILE.nc keeps it).")
-@click.option("--noiseless", is_flag=True, help="Sensors without error; what estimators believe of them stays.")
+@click.option("--noiseless", is_flag=True, help="Sensors without error; the noise that estimators assume is unchanged.")
 def command(
     source: str,
     output_file: str | None,

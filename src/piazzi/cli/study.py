@@ -25,9 +25,9 @@ ENDINGS = (".nc",)
     "--runs", type=options.WholeNumber(1), metavar="N", help="Runs at every point.  [default: the scenario's, or 100]"
 )
 @options.estimators("the scenario's, or ekf")
-@click.option("--vary", multiple=True, metavar="NAME=V,V,...", help="Vary this; repeatable, for a grid.  See above.")
+@click.option("--vary", multiple=True, metavar="NAME=V,V,...", help="Vary this; may be repeated, for a grid.  See above.")
 @options.output("Keep all runs in this .nc file.")
-@click.option("--resume", is_flag=True, help="Go on with what FILE has of this study.")
+@click.option("--resume", is_flag=True, help="Continue this study from the runs in FILE.")
 @click.option(
     "--workers", type=options.WholeNumber(0), metavar="N", help="Processes; 0 is this one.  [default: one per processor]"
 )
@@ -55,7 +55,7 @@ def command(
     """Simulate, estimate and score many runs of SCENARIO.
 
     Run i is the same whatever the workers, their number or the order: draws of prior, process and measurement noise are
-    children of the seed.  What is finished is on disk: after Ctrl-C, a crash or a full disk, --resume goes on from there.
+    children of the seed.  Completed runs are saved: after Ctrl-C, a crash or a full disk, --resume continues from there.
 
     --vary takes settings of estimators (lag, iterations, gate, ...), and R.scale, R.STATION.scale, Q.scale, P.scale, substeps
     and parameters of the scenario; those change what happens and what is believed, with assumed. or truth. before the name one
@@ -71,7 +71,7 @@ def command(
         raise click.UsageError("-o -: a study goes into a .nc file", click.get_current_context())
     output.check_output(output_file, ENDINGS)
     if resume and output_file is None:
-        raise click.UsageError("--resume needs -o FILE, the study to go on with", click.get_current_context())
+        raise click.UsageError("--resume needs -o FILE, the study to continue", click.get_current_context())
     reporting.check(report)
     if figures is not None:
         output.make_folder(figures, "study-nees.png")
@@ -165,9 +165,9 @@ def _run(study: Study, path: Path, run: dict[str, Any], lasting: bool) -> Stored
     except (KeyboardInterrupt, OSError, RuntimeError) as error:
         kept = kept_runs(path)
         if kept and lasting:
-            say(f"{kept:,} of {total:,} runs are kept beside {path}: --resume goes on from there")
+            say(f"{kept:,} of {total:,} runs are kept beside {path}: --resume continues from there")
         elif kept:
-            say(f"the {kept:,} finished runs are gone: with -o FILE they are kept, and --resume goes on from there")
+            say(f"the {kept:,} completed runs were discarded; use -o FILE to keep them")
         if isinstance(error, RuntimeError):
             raise ValueError(str(error)) from error
         raise

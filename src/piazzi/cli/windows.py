@@ -61,7 +61,7 @@ def command(
 ) -> int:
     """Try sliding windows of several lengths on SOURCE.
 
-    Shows accuracy in real time (the newest state) and delayed (each state as it leaves the window), honesty and microseconds
+    Shows accuracy in real time (the newest state) and delayed (each state as it leaves the window), consistency and time
     per step against window length, and seconds of the full graph against the number of epochs.
 
     Examples:

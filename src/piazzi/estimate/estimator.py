@@ -140,7 +140,7 @@ class Estimate(Locked):
         return f"the measurement of row {rows[0]} (t = {self.tracking.row_times[rows[0]]:g} s) has no prediction"
 
     def predict(self, times: Any) -> Forecast:
-        """The last belief carried forward, with the process noise and manoeuvres on the way, and how it grows.
+        """The last belief propagated, with the process noise and manoeuvres on the way, and how it grows.
 
         Parameters
         ----------

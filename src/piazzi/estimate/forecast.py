@@ -22,7 +22,7 @@ MOST_PARTS = 10**7
 
 @dataclass(frozen=True, eq=False)
 class Forecast(Locked):
-    """Beliefs carried forward from the last epoch of an estimate.
+    """Beliefs propagated from the last epoch of an estimate.
 
     Attributes
     ----------
@@ -76,10 +76,10 @@ def forecast(estimate: Estimate, times: Any) -> Forecast:
     start = float(estimate.times[-1])
     at, last, P_last = _checked(times, start), estimate.mean[-1], estimate.covariance[-1]
     if not (np.isfinite(last).all() and np.isfinite(P_last).all()):
-        raise ValueError(f"nothing can be carried forward: {estimate.message}")
+        raise ValueError(f"nothing can be propagated: {estimate.message}")
     way = (at, start, *_parts(estimate, at))
     if not has_considered(estimate):
-        raise ValueError(f"nothing can be carried forward: {estimate.message}")
+        raise ValueError(f"nothing can be propagated: {estimate.message}")
     considered = {name: estimate.details[f"considered_{name}"][-1] for name in estimate.problem.considered}
     own = P_last - sum((np.outer(s, s) for s in considered.values()), np.zeros_like(P_last))
     mean, P = _carried(estimate.problem, way, last, own)
@@ -147,7 +147,7 @@ def _parts(estimate: Estimate, at: Array) -> tuple[Array, Array, Array]:
     wanted = np.ceil(dt / np.median(usual) * (1 - 1e-9)) if usual else np.sign(dt)
     if wanted.sum() > MOST_PARTS:
         raise ValueError(
-            f"the last time is {wanted.sum():.3g} of the tracking's intervals ahead; at most {MOST_PARTS:g} are carried forward"
+            f"the last time is {wanted.sum():.3g} of the tracking's intervals ahead; at most {MOST_PARTS:g} are allowed"
         )
     part = dt / np.maximum(wanted, 1)
     return wanted.astype(np.int64), problem.integrator.counts(part), problem.process_noise.scale(part)

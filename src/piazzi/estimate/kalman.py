@@ -42,7 +42,7 @@ class ExtendedKalmanFilter:
         equal.  "auto" takes components where every R is diagonal.
     iterations : int
         Gauss-Newton steps per epoch, on the prediction and the measurements of the epoch together: from the second on, the
-        measurements are linearised at the estimate that they gave.  One is the filter that everybody means.
+        measurements are linearised at the estimate that they gave.  1 is the standard EKF.
     gate : float, optional
         Probability that a good measurement passes, such as 0.999.  A row whose nu^T S^-1 nu at the prediction lies beyond that
         quantile of chi-square is left out; ``details["rejected"]`` marks such rows, ``details["rejected_count"]`` counts them.
@@ -148,7 +148,7 @@ def check_start(problem: Problem, inputs: Inputs, first: Array) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """A belief carried forward: mean (n,), covariance (n, n), and the transition matrix Phi and process noise Q that did it."""
+    """A belief propagated forward: mean (n,), covariance (n, n), the transition matrix Phi and the process noise Q."""
 
     mean: Array
     covariance: Array

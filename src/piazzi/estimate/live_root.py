@@ -1,4 +1,4 @@
-"""A filter that carries a root of its covariance, fed one measurement at a time."""
+"""A filter that propagates a square root of its covariance, fed one measurement at a time."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def _sentence(coarse: Estimate, fine: Estimate, between: StepError, finer: int, 
             f"{_at_worst(between)}; {advice}, or use DormandPrince"
         )
     if lost := _lost(fine, truth):
-        return f"the estimate is lost, with steps of any length: {lost}; its sigma says nothing"
+        return f"the estimate diverges with steps of any length: {lost}; its sigma is meaningless"
     if not coarse.success:
         return f"the integrator's steps are too long: the estimate is not finite, and is with {finer} times as many; {advice}"
     moved = _moved(coarse, fine)

@@ -39,7 +39,9 @@ def with_prior_at(problem: Problem, t: float) -> Problem:
         return problem
     where = f"the prior at {stands:g} s cannot be propagated back to the first measurement at {t:g} s"
     if problem.model.discrete or problem.model.memory:
-        raise ValueError(f"{where}: the model is a step or remembers one, which has no way back; give an earlier prior time")
+        raise ValueError(
+            f"{where}: the model is a step or has memories, so it cannot run backwards; give an earlier prior time"
+        )
     check_after(problem.manoeuvres, stands)
     x, step = _start(problem, float(t), float(stands - t), where)
     P = _moved_covariance(problem, step, where)

@@ -1,4 +1,4 @@
-"""Filters that carry a root of their covariance: what the square-root and the unscented filter have in common."""
+"""Filters that propagate a square root of their covariance: what the square-root and the unscented filter have in common."""
 
 from __future__ import annotations
 

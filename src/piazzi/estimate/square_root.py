@@ -14,7 +14,7 @@ from piazzi.problem import Problem, Tracking
 
 @dataclass(frozen=True)
 class SquareRootKalmanFilter:
-    """The extended Kalman filter, carrying a root of the covariance: semidefinite on problems where a covariance is lost.
+    """The extended Kalman filter, propagating a square root of the covariance, which stays semidefinite.
 
     Parameters
     ----------

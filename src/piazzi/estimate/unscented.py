@@ -15,7 +15,7 @@ from piazzi.problem import Problem, Tracking
 
 @dataclass(frozen=True)
 class UnscentedKalmanFilter:
-    """Kalman filter whose means and covariances come from 2 n + 1 points that are carried and measured, not from Jacobians.
+    """Kalman filter whose means and covariances come from 2 n + 1 points that are propagated and measured, not from Jacobians.
 
     Parameters
     ----------
@@ -35,10 +35,10 @@ class UnscentedKalmanFilter:
     Julier and Uhlmann, Proc. IEEE 92 (2004), scaled after Wan and van der Merwe (2000).  A small alpha takes the second
     derivatives at the mean, one near 1 an average over the distribution.  With beta 0 the default is the cubature Kalman filter
     (Arasaratnam and Haykin, IEEE Trans. Automatic Control 54, 2009).  The points are those of the Cholesky factor, drawn
-    anew after process noise is added: on linear problems that makes the filter exact.  A root of the covariance is carried (van
-    der Merwe and Wan 2001), so singular covariances are ordinary and none turns indefinite.  Angles are averaged as differences
-    from the central point's.  Process noise along an interval is the central point's.  All rows of one epoch are measured at
-    the same predicted points.
+    anew after process noise is added: on linear problems that makes the filter exact.  A square root of the covariance is
+    propagated (van der Merwe and Wan 2001), so singular covariances are ordinary and none turns indefinite.  Angles are
+    averaged as differences from the central point's.  Process noise along an interval is the central point's.  All rows of
+    one epoch are measured at the same predicted points.
     """
 
     alpha: float = 1.0

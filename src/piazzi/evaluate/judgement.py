@@ -1,4 +1,4 @@
-"""Whether covariances can be taken at their word: one judgement, told by terminal and page alike."""
+"""Whether covariances are consistent with errors: one judgement for terminal and page."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Claim:
 
 
 def sound(rows: Sequence[Row]) -> list[Row]:
-    """Rows whose covariance is worth a judgement: the others failed or diverged, and are told of by that."""
+    """Rows whose covariance is worth a judgement: the others failed or diverged, and are reported as such."""
     return [r for r in rows if r.success and not r.diverged]
 
 

@@ -66,7 +66,7 @@ def _states(found: Observability) -> Grid:
         values += [] if found.without_noise is None else [found.without_noise.crlb_sigma[i]]
         values += [] if more is None else [more.crlb_sigma[i]]
         rows.append((name, *(number(float(v) * show.factor, 4) for v in values), show.unit))
-    return Grid("First state, and how well the measurements alone tell it", (*heads, "unit"), tuple(rows))
+    return Grid("First state, and how well the measurements alone determine it", (*heads, "unit"), tuple(rows))
 
 
 def _directions(found: Observability) -> Grid:

@@ -32,7 +32,7 @@ def weakest(names: Sequence[str], direction: Array) -> dict[str, float]:
 
 def verdict(found: Observability) -> str:
     """What was found and what follows from it, in sentences."""
-    doubt = f"Not to be relied on: the factor graph, whose estimate stands in for the truth, did not succeed: {found.message}."
+    doubt = f"Unreliable: the factor graph, whose estimate replaces the unknown truth, did not succeed: {found.message}."
     doubts = [] if found.success else [doubt]
     return printable(" ".join([*doubts, *_local(found), *_twins(found), *_conclusion(found)]))
 
@@ -52,7 +52,11 @@ def _local(found: Observability) -> list[str]:
     smallest = float(values[-1])
     how = "to" if smallest > _FEEBLE else "only to"
     better = np.flatnonzero(found.growth_values[:, -1] > _FEEBLE)
-    since = f" From t = {found.growth_times[better[0]]:g} s on they tell all better than the prior." if better.size else ""
+    since = (
+        f" From t = {found.growth_times[better[0]]:g} s on they determine every direction better than the prior."
+        if better.size
+        else ""
+    )
     noise = "" if found.without_noise is None else "With the process noise assumed, "
     return [
         f"Observability: the first state is observable from the measurements alone, condition {number(found.condition, 3)}; "
@@ -81,7 +85,7 @@ def _twins(found: Observability) -> list[str]:
         out.append(f"And {len(found.twins) - _LISTED} more twins.")
     far = [twin.prior_distance is not None and twin.prior_distance > _FAR for twin in found.twins]
     if all(far):
-        out.append("Only the prior tells the truth from a twin, and it does so clearly.")
+        out.append("Only the prior distinguishes the truth from a twin, and does so clearly.")
     return out
 
 
@@ -99,18 +103,20 @@ def _conclusion(found: Observability) -> list[str]:
         out.append(f"Verdict: a twin; {' and '.join(stray)} ended on its orbit.")
     elif graph.excess <= attained < ekf.excess and ekf.excess > CLEARLY * graph.excess:
         out.append(
-            "Verdict: linearisation. The information is there and the graph gets it; neither lack of observability nor a twin "
-            "is what spoils the EKF, but its Jacobians, taken once and at the wrong place: "
+            "Verdict: linearisation. The information is there and the graph extracts it. The EKF does not because it takes its "
+            "Jacobians once, at a wrong state; neither observability nor a twin limits it: "
             f"with Jacobians from the truth the same filter has {_times(ideal.excess)}."
         )
     elif max(ekf.excess, graph.excess) <= attained and (found.singular_values == 0).any():
-        out.append("Verdict: observability. Both attain it, and what cannot be seen stays as uncertain as the prior.")
+        out.append("Verdict: observability. Both attain the bound; unobservable directions stay as uncertain as in the prior.")
     elif max(ekf.excess, graph.excess) <= attained:
-        out.append("Verdict: both attain it; nothing is wrong.")
+        out.append("Verdict: both attain the bound; nothing is wrong.")
     else:
-        out.append("Verdict: no estimator tried attains it, so linearisation or the model, not observability, limits them.")
+        out.append(
+            "Verdict: neither estimator attains the bound, so linearisation or the model, not observability, limits them."
+        )
     return out
 
 
 def _times(excess: float) -> str:
-    return number(excess, 2) if np.isfinite(excess) else "lost"
+    return number(excess, 2) if np.isfinite(excess) else "diverged"

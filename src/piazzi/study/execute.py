@@ -110,7 +110,7 @@ def _log(study: Study, path: Path, resume: bool) -> Log:
     if not path.exists():
         return Log.create(path, study.specification | {"versions": fingerprint()})
     if not resume:
-        raise ValueError(f"{path} has runs of a study that was not finished: --resume goes on with it, removing it begins anew")
+        raise ValueError(f"{path} has runs of a study that was not finished: --resume continues it, removing it starts again")
     log = Log.open(path)
     versions = log.specification.pop("versions", None)
     difference = _difference(log.specification, study.specification)

@@ -59,7 +59,7 @@ def score_lanes(scores: Scores, n: int, kept: Array, seconds: float) -> Scored:
     """Scores of runs in lanes, all of which succeeded, with definite covariances."""
     M, K = scores.nees.shape
     half = slice(K // 2, None)
-    squared = scores.squared  # sums run along memory: the same bits in any company
+    squared = scores.squared  # sums run along memory: the same bits whatever runs beside them
     later, earlier = squared[:, :, 3 * K // 4 :], squared[:, :, K // 2 : 3 * K // 4]
     numbers = {
         "rmse": _root_mean(squared),

@@ -14,8 +14,8 @@ from piazzi.present.report.windows import table_of
 from piazzi.present.tables import summary
 
 _INTRO = (
-    "What the measurements alone, without the prior, say about the first state, as they come in: a singular value s tells a"
-    " direction of the state to 1/s prior sigma, and no unbiased estimator does better than the Cramer-Rao sigma."
+    "What the measurements alone, without the prior, say about the first state, as they come in: a singular value s determines"
+    " a direction of the state to 1/s prior sigma, and no unbiased estimator does better than the Cramer-Rao sigma."
 )
 _HEADINGS: dict[str, Tone] = {"Verdict": "good", "Observability": "plain", "Twins": "plain", "Twin": "plain"}
 _TRIED = "Errors of the last half"  # how the sentence on what estimators made of it begins
@@ -37,7 +37,7 @@ def observability_tab(found: Observability, *, title: str = "") -> Tab:
 def observability_section(found: Observability, *, words: bool = True) -> Section:
     """Singular values and Cramer-Rao sigmas over time, directions, and twins."""
     says = [Text([f"{point.heading}: {point.text}" for point in said(found)])] if words else []
-    return Section("What can be seen", [*says, _singular_values(found), _sigmas(found), *map(table_of, grids(found))], _INTRO)
+    return Section("Observability", [*says, _singular_values(found), _sigmas(found), *map(table_of, grids(found))], _INTRO)
 
 
 def said(found: Observability) -> list[Point]:

@@ -51,8 +51,8 @@ def _tab(summary: Summary, index: int, title: str) -> Tab:
         heading(stored),
         _points(summary, lines),
         [
-            Section("How far off", charts, "Over all runs that did not fail, at each epoch."),
-            Section("Are they honest?", [_nees(lines, keys, axis, stored.times)]),
+            Section("Errors", charts, "Over all runs that did not fail, at each epoch."),
+            Section("Consistency", [_nees(lines, keys, axis, stored.times)]),
             _table(summary, index, rows),
             Section("How to read this", [Text([*_READING, *failures(summary)])]),
         ],
@@ -114,7 +114,7 @@ def _table(summary: Summary, index: int, rows: int) -> Section:
 
 
 def _points(summary: Summary, lines: Sequence[Result]) -> list[Point]:
-    """The smallest errors, who diverges, who is honest, and who is cheap."""
+    """The smallest errors, who diverges, whose covariance is consistent, and who is cheap."""
     group = summary.stored.groups[0]
     show = group_display(summary.stored, group)
     out = []
@@ -129,8 +129,8 @@ def _points(summary: Summary, lines: Sequence[Result]) -> list[Point]:
     out.append(Point("Diverged", f"{text}." if text else "No run.", "bad" if diverged else "good"))
     honest = [line for line in lines if (line.course.inside or 0.0) >= 0.9]
     names = ", ".join(label_of(line.estimator, line.view) for line in honest)
-    text = f"{names}." if names else "None: mean NEES leaves its bounds."
-    out.append(Point("Honest at nine epochs of ten", text, "good" if honest else "bad"))
+    text = f"{names}." if names else "None: the mean NEES leaves its bounds."
+    out.append(Point("Consistent at nine epochs of ten", text, "good" if honest else "bad"))
     failed = [line for line in lines if line.failed]
     if failed:
         text = "; ".join(f"{label_of(line.estimator, line.view)}: {line.failed:,}" for line in failed)

@@ -23,7 +23,7 @@ _INTRO = "Errors and NEES of the last half of the run, and cost, against the num
 
 def windows_tab(trade: WindowTrade, *, title: str = "") -> Tab:
     """A window trade by itself."""
-    says = [Point("How long a window", " ".join(sentences(trade)), "good" if trade.success else "bad")]
+    says = [Point("Window length", " ".join(sentences(trade)), "good" if trade.success else "bad")]
     subtitle = summary(trade.problem, trade.tracking, trade.source or "measurements")
     return Tab(title or trade.source or "Windows", subtitle, says, [windows_section(trade, words=False)])
 
@@ -35,7 +35,7 @@ def windows_section(trade: WindowTrade, *, words: bool = True) -> Section:
     timing = [] if trade.timing is None else [_timing(trade.timing.epochs, trade.timing.seconds)]
     tables = [table_of(grid) for grid in grids(trade)]
     says = [Text(sentences(trade))] if words else []
-    return Section("How long a window has to be", [*says, *charts, *timing, *tables], _INTRO)
+    return Section("Window length", [*says, *charts, *timing, *tables], _INTRO)
 
 
 def table_of(grid: Grid) -> Table:

@@ -1,4 +1,4 @@
-"""What a comparison means, in plain words: what is best, what is not to be trusted and why, what it costs."""
+"""What a comparison means, in plain words: what is best, whose covariance is inconsistent and how, what it costs."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def _failed(rows: Sequence[Row]) -> list[Point]:
 
 
 def _honesty(comparison: Comparison) -> list[Point]:
-    """Whose covariance can be taken at its word."""
+    """Whose covariance is consistent with the errors."""
     found = claims(comparison.rows, comparison.tracking.values)
     everyone = [r for claim in found for r in claim.rows]
     what = "Errors" if errors_known(sound(comparison.rows)) else "Innovations"
