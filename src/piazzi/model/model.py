@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from piazzi.expressions import names
 from piazzi.model.definitions import definitions_of, needed, unused
@@ -54,6 +54,21 @@ class Model:
     discrete: bool = False
     memory: Any = field(default_factory=dict)
     definitions: Any = field(default_factory=dict)
+
+    if TYPE_CHECKING:  # what is taken; the fields above say what is kept of it
+
+        def __init__(
+            self,
+            states: Sequence[Any],
+            dynamics: Sequence[Any] | Mapping[str, Any],
+            sensors: Sensor | Sequence[Sensor] = (),
+            parameters: Sequence[Any] | Mapping[str, str] = (),
+            groups: Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str]]] = (),
+            units: Mapping[str, str] | Sequence[tuple[str, str]] = (),
+            discrete: bool = False,
+            memory: Mapping[str, str] | Sequence[tuple[str, str]] = (),
+            definitions: Mapping[str, Any] | Sequence[tuple[str, Any]] = (),
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         put = object.__setattr__

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from piazzi.model.definitions import definitions_of, needed, unused
 from piazzi.model.naming import name_of, text_of
@@ -68,6 +68,18 @@ class Sensor:
     number_units: Any = field(default_factory=dict)
     definitions: Any = field(default_factory=dict)
     components: tuple[str, ...] = field(init=False)
+
+    if TYPE_CHECKING:  # what is taken; the fields above say what is kept of it
+
+        def __init__(
+            self,
+            name: str,
+            equations: Mapping[str, Any] | Sequence[Any],
+            angles: Sequence[str] = (),
+            units: Mapping[str, str] | Sequence[tuple[str, str]] = (),
+            number_units: Mapping[str, str] | Sequence[tuple[str, str]] = (),
+            definitions: Mapping[str, Any] | Sequence[tuple[str, Any]] = (),
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         put = object.__setattr__
