@@ -129,3 +129,12 @@ def test_what_is_known_for_certain_is_correlated_with_nothing():
     certain[0, 1] = certain[1, 0] = 1e-6
     assert not semidefinite(certain[None])[0]
     assert not semidefinite(np.diag([-1e-300, 1.0])[None])[0]
+
+
+def test_variances_without_digits_are_judged_by_what_is_left_of_them():
+    """A variance of two units in the last place there is; beside it a covariance that it cannot carry."""
+    tiny, beside = 2 * 5e-324, 3.2e-162
+    P = np.array([[1.0, beside], [beside, tiny]])
+    assert beside > 1.005 * np.sqrt(tiny)
+    assert not semidefinite(P[None])[0]
+    assert defect(np.zeros((1, 2)), P[None], ["x", "y"], lambda k: "here") == "the covariance is not semidefinite here"

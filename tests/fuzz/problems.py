@@ -33,7 +33,7 @@ from tests.fuzz.exact import posterior  # noqa: E402
 
 SMALL = [0.0, -0.0, 5e-324, 1e-310, 1e-300, 1e-200, 1e-160, 1e-100, 1e-20, 1e-16, 1e-8, -1e-5, 1.0, -1.0, np.pi]
 LARGE = [1e8, 2.0**53, 1e20, 1e100, 1e150, 1e154, 1e160, 1e200, 1e300, -1e300, 1.7e308, np.nan, np.inf, -np.inf]
-LEAST = 1e-300  # variances below have no digits to be judged by
+NOTHING = 5e-324  # in the place of a variance of zero
 Array = np.ndarray[Any, Any]
 
 matrix = [[f"a{i}{j}" for j in range(3)] for i in range(3)]
@@ -192,7 +192,8 @@ def unsound(mean: Array, covariance: Array, success: bool, message: str) -> str:
         return "success with a negative variance"
     if not np.array_equal(covariance, np.swapaxes(covariance, 1, 2)):
         return "success, not symmetric"
-    sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), LEAST))
+    variance = np.diagonal(covariance, axis1=1, axis2=2)
+    sigma = np.sqrt(np.where(variance > 0, variance, NOTHING))
     least = np.linalg.eigvalsh(covariance / sigma[:, :, None] / sigma[:, None, :]).min()
     return "" if least >= -1e-9 * mean.shape[1] else f"success with an eigenvalue below {decade(least)}"
 

@@ -158,3 +158,16 @@ def test_live_estimates_are_right_or_say_that_they_are_not(case, estimator):
             session.checkpoint()
     else:
         assert session.success
+
+
+@pytest.mark.parametrize("wide", [1e20, 1e150, 1e200, 1e300])
+@pytest.mark.parametrize("estimator", [pz.SquareRootKalmanFilter(), pz.ExtendedKalmanFilter()], ids=["square root", "ekf"])
+def test_roots_hold_what_is_beside_a_direction_of_any_width(wide, estimator):
+    """x is all but unknown, y is known to 2, and x + y/2 measured: that says nothing of y, and of x what it leaves of y."""
+    model = pz.Model(["x", "y"], ["x", "y"], [pz.Sensor("r", ["x + 0.5*y"])], discrete=True)
+    problem = pz.Problem(model, pz.Gaussian([0, 0], [wide, 2.0]), None, [pz.Station("s", "r", 300.0)])
+    estimate = estimator.estimate(problem, pz.Tracking([0.0], [5.0]))
+    assert estimate.success
+    expected = np.array([[300 + 0.25 * 2, -0.5 * 2], [-0.5 * 2, 2]])
+    np.testing.assert_allclose(estimate.covariance[0], expected, rtol=1e-12)
+    np.testing.assert_allclose(estimate.mean[0], [5.0, 0.0], atol=1e-12)

@@ -9,7 +9,8 @@ import numpy as np
 from piazzi.problem.checks import Array
 
 INDEFINITE = 1e-9  # times n: an eigenvalue of correlations further below zero is none of rounding
-LEAST = 1e-300  # variances below have no digits left to be judged by
+NOTHING = 5e-324  # the least number, for a variance of zero, so that a covariance beside it shows
+FULL = 1e-290  # variances below may have lost digits, as numbers near the smallest do
 
 
 def defect(
@@ -38,7 +39,9 @@ def defect(
 def _is_definite(mean: Array, covariance: Array) -> bool:
     """Whether all is finite and every covariance has a Cholesky factor: what nearly all have, and quickly told."""
     try:
-        return bool(np.isfinite(mean).all() and np.isfinite(covariance).all() and np.linalg.cholesky(covariance).size)
+        if not (np.isfinite(mean).all() and np.isfinite(covariance).all()):
+            return False
+        return np.linalg.cholesky(covariance).size > 0 and bool(np.diagonal(covariance, axis1=1, axis2=2).min() > FULL)
     except np.linalg.LinAlgError:
         return False
 
@@ -52,7 +55,8 @@ def semidefinite(P: Array) -> Array:
 def lowest_eigenvalues(P: Array) -> Array:
     """The smallest eigenvalue of the correlations of each covariance (K, n, n), minus infinity where it has none, (K,)."""
     with np.errstate(all="ignore"):
-        sigma = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2), LEAST))
+        variance = np.diagonal(P, axis1=1, axis2=2)
+        sigma = np.sqrt(np.where(variance > 0.0, variance, NOTHING))
         correlations = P / sigma[:, :, None] / sigma[:, None, :]
     there = np.isfinite(correlations).all(axis=(1, 2))
     lowest = np.full(len(P), -np.inf)

@@ -90,7 +90,7 @@ def absorb_root(nu, G, at, B, d, phi):
             for j in range(unknowns()):
                 after = before + phi[j] * phi[j]
                 b = B[i * unknowns() + j]
-                B[i * unknowns() + j] = (before * b - s * phi[j]) / sqrt(before * after)
+                B[i * unknowns() + j] = sqrt(before / after) * b - s / sqrt(before) * (phi[j] / sqrt(after))
                 s += b * phi[j]
                 before = after
 
