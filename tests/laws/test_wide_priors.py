@@ -171,3 +171,35 @@ def test_roots_hold_what_is_beside_a_direction_of_any_width(wide, estimator):
     expected = np.array([[300 + 0.25 * 2, -0.5 * 2], [-0.5 * 2, 2]])
     np.testing.assert_allclose(estimate.covariance[0], expected, rtol=1e-12)
     np.testing.assert_allclose(estimate.mean[0], [5.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("rough", [1e4, 1e5, 1e6, 1e7])
+@pytest.mark.parametrize("wide", [1e7, 1e8, 1e9, 1e10])
+def test_windows_are_right_or_say_that_they_are_not_where_exact_measurements_come_late(wide, rough):
+    """After rough ones, for which the prior is not too wide, between them: their innovations are kept nowhere."""
+    stations = [pz.Station("rough", "r", rough**2), pz.Station("fine", "r", 1e-4)]
+    problem = pz.Problem(LINE, pz.Gaussian.from_sigma([0, 0], [wide, wide]), None, stations)
+    window = pz.SlidingWindow(lag=10).start(problem)
+    rows = [("rough", 0.0), ("rough", 1.0), ("rough", 2.0), ("fine", 0.5), ("fine", 1.5)]
+    for name, t in rows:
+        window.update(name, 5.0 * t, t)
+    with mp.workdps(60):
+        A, F = mp.diag([mp.mpf(wide) ** -2] * 2), mp.matrix([[1, 2], [0, 1]])
+        for name, t in rows:
+            A = A + mp.matrix([1, t]) * mp.matrix([[1, t]]) / mp.mpf(rough**2 if name == "rough" else 1e-4)
+        P = F * A**-1 * F.T
+        sigma = np.array([float(mp.sqrt(P[i, i])) for i in (0, 1)])
+    with np.errstate(invalid="ignore"):
+        right = (np.abs(np.sqrt(np.diag(window.covariance)) / sigma - 1) < 1e-4).all()
+    assert right or not window.success
+
+
+@pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.SlidingWindow()], ids=["ekf", "window"])
+def test_a_checkpoint_from_before_the_prior_was_too_wide_is_gone_on_from(estimator):
+    problem, tracking = line(*CASES["1e20"])
+    session = estimator.start(problem)
+    before = session.checkpoint()
+    session.update("s", tracking.values[0, 0], tracking.times[0])
+    assert not session.success
+    session.restore(before)
+    assert session.success, session.message

@@ -243,6 +243,7 @@ class LiveFilter(Session):
         for name in (*_KEPT, "mean", "covariance"):
             getattr(self, name if name in ("mean", "covariance") else "_" + name)[...] = kept[name]
         self._clock.time, self._predicted_to = clock_times(kept["clock"])
+        self.widest.fill(0.0)  # there are no checkpoints of what is too wide
         self._measured = bool(kept["clock"][2])
 
 

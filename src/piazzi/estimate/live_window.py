@@ -137,8 +137,11 @@ class LiveWindow(Session):
             window.x[window.first : window.stop] = window.x_before[window.first : window.stop]
         else:
             self._insert(t)
-        window.add_row(window.find(t), self._row, s)
-        self._settle(late=t < window.t[window.stop - 1])
+        k = window.find(t)
+        window.add_row(k, self._row, s)
+        self._settle(late=k < window.stop - 1)
+        if k < window.stop - 1:
+            self._note_width(k)
         return True
 
     def _begin(self, t: float) -> None:
@@ -203,6 +206,14 @@ class LiveWindow(Session):
             self.innovation.fill(np.nan)
             self.innovation_covariance.fill(np.nan)
 
+    def _note_width(self, k: int) -> None:
+        """Keep the largest predicted variance, in units of its noise, of rows of an older epoch: they have no innovations."""
+        window, (nu, H, _) = self._window, self._linear
+        first, m = window.first_row[window.first], self.problem.model.width
+        rows = slice((window.first_row[k] - first) * m, (window.first_row[k + 1] - first) * m)
+        seen = H[rows][~np.isnan(nu[rows])]
+        self.widest[0] = np.max(np.sum(seen @ self._P_pred[k - window.first] * seen, axis=1), initial=self.widest[0])
+
     def _rebind(self) -> None:
         if self._window.room != self._room:
             before = self._linear
@@ -216,7 +227,7 @@ class LiveWindow(Session):
         self._room = E, R = w.room
         given, Q, noisy = p.given, p.process_noise.covariance, E if p.noise_varies else 1
         self._linear = nu, H, dx = np.zeros(R * m), np.zeros((R * m, n)), np.zeros((E, n))
-        self._nu, self._S = np.zeros((R, m)), np.zeros((R, m, m))
+        self._nu, self._S, self._P_pred = np.zeros((R, m)), np.zeros((R, m, m)), np.zeros((E, n, n))
         self._oldest_covariance, self._newest_covariance = np.zeros((E, n, n)), np.zeros((n, n))
         epochs = w.t, w.count, w.scale, w.first_row
         self._predict_once: Callable[[], None] = self._library.live_append.bind(self._span, w.t, w.count, given, w.x)
@@ -243,7 +254,7 @@ class LiveWindow(Session):
             nu,
             H,
             np.zeros((E, n)),
-            np.zeros((E, n, n)),
+            self._P_pred,
             np.zeros((R * m + n, n + 1)),
             np.zeros((E, n)),
             dx,
@@ -331,6 +342,7 @@ class LiveWindow(Session):
         self.mean, self.covariance = kept["mean"], kept["covariance"]
         self._newest = self.mean.copy(), self.covariance.copy()
         self.innovation, self.innovation_covariance = kept["innovation"], kept["innovation_covariance"]
+        self.widest.fill(0.0)  # there are no checkpoints of what is too wide
         self._bind()
         if len(self._window):
             for values, name in zip(self._linear, ("nu_lin", "H_lin", "dx"), strict=True):
