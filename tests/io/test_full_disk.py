@@ -44,7 +44,7 @@ def test_commands_say_which_file_could_not_be_written_and_leave_nothing(what, tm
 def test_kernels_that_cannot_be_kept_run_all_the_same(tmp_path):
     code = "import os\nos.environ['PIAZZI_CACHE'] = 'cache'\nfrom piazzi.cli.main import main\n"
     code += "sys.argv = ['piazzi', 'estimate', 'b612-range', '--with', 'ekf', '--json']\nsys.exit(main())"
-    run = limited(10_000, code, tmp_path)
+    run = limited(5_000, code, tmp_path)
     assert (run.returncode, run.stdout[:1]) == (0, "{"), run.stderr
     assert "kernels are not kept" in run.stderr
 

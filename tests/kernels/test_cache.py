@@ -46,9 +46,9 @@ def compiled():
 
     kept = {}
 
-    def once(path, names):
+    def once(source, names):
         if not kept:
-            kept["result"] = compile_entries(path, names)
+            kept["result"] = compile_entries(source, names)
         once.count += 1
         assert names == entry_names(SMALL.source("compiled"))
         return kept["result"]
@@ -146,7 +146,7 @@ def test_damage_is_noticed_and_mended(fresh, builds, name):
 
 
 def test_a_failed_build_leaves_nothing(fresh, monkeypatch):
-    def fail(path, names):
+    def fail(source, names):
         raise RuntimeError("no compiler today")
 
     monkeypatch.setattr(cache, "compile_entries", fail)

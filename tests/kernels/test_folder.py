@@ -65,7 +65,7 @@ def builds(made, monkeypatch):
     """The compilations so far, which take what was compiled once."""
     count = []
 
-    def compiled(path, names):
+    def compiled(source, names):
         count.append(names)
         home = made / SMALL.digest()
         manifest = json.loads((home / "manifest.json").read_text())

@@ -110,7 +110,7 @@ def test_first_compilation_is_told_in_one_line(monkeypatch, caplog, tmp_path):
 
     monkeypatch.setenv("PIAZZI_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(cache, "_loaded", {})
-    monkeypatch.setattr(cache, "compile_entries", lambda path, names: ({}, {}))
+    monkeypatch.setattr(cache, "compile_entries", lambda source, names: ({}, {}))
     folder.private_folder.cache_clear()
     folder.writable_folder.cache_clear()
     try:

@@ -1,6 +1,7 @@
 """What the parts of a kernel define and need is checked before it is compiled, and a source that fails is kept."""
 
 import ast
+import tempfile
 import traceback
 
 import pytest
@@ -48,13 +49,11 @@ def test_what_no_entry_calls_may_lack_what_it_needs():
         check_names({"a": "@entry\ndef run(x):\n    g(x)\n\ndef g(x):\n    return nothing(x)\n"})
 
 
-def test_the_source_of_a_build_that_failed_is_kept_and_named(tmp_path):
-    work = tmp_path / "building"
-    work.mkdir()
+def test_the_source_of_a_build_that_failed_is_kept_and_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     text = "from piazzi.kernels.compiled import *\n\n\n@entry\ndef run(x: Array):\n    x[0] = nothing_of_this_name\n"
-    (work / "kernels.py").write_text(text)
     with pytest.raises(Exception, match="nothing_of_this_name") as caught:
-        compile_entries(work / "kernels.py", ("run",))
+        compile_entries(text, ("run",))
     (kept,) = tmp_path.glob("failed-*.py")
     assert kept.read_text() == text
     assert str(kept) in "".join(traceback.format_exception(caught.value))

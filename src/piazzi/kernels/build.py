@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import tempfile
-from pathlib import Path
+from importlib.abc import InspectLoader
+from importlib.util import module_from_spec, spec_from_loader
 from types import ModuleType
 from typing import Any
 
@@ -14,23 +14,33 @@ from piazzi.kernels.settings import own_settings
 UNKNOWN_INSIDE = (ImportError, AttributeError, TypeError)
 
 
-def import_file(path: Path) -> ModuleType:
-    """The module of a source file that we wrote ourselves, without leaving it in `sys.modules`."""
-    spec = importlib.util.spec_from_file_location(f"piazzi_generated_{path.parent.name}", path)
+class _Generated(InspectLoader):
+    """Source that we wrote ourselves, in memory: a disk may be full."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+
+    def get_source(self, fullname: str) -> str:
+        return self.source
+
+
+def module_of(source: str) -> ModuleType:
+    """The module of a source, without leaving it in `sys.modules`."""
+    spec = spec_from_loader("piazzi_generated", _Generated(source))
     if spec is None or spec.loader is None:
-        raise ImportError(f"cannot import {path}")
-    module = importlib.util.module_from_spec(spec)
+        raise ImportError("cannot import what was generated")
+    module = module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-def plain_entries(path: Path, names: tuple[str, ...]) -> dict[str, PlainEntry]:
+def plain_entries(source: str, names: tuple[str, ...]) -> dict[str, PlainEntry]:
     """The entries of a module generated for the plain vocabulary."""
-    module = import_file(path)
+    module = module_of(source)
     return {name: PlainEntry(getattr(module, name)) for name in names}
 
 
-def compile_entries(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
+def compile_entries(source: str, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     """Object code of each entry, and its symbol with the kinds of its arguments.
 
     Raises
@@ -39,40 +49,42 @@ def compile_entries(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes
         Among others, where parts of Numba are no longer what they were: `live_entries` may serve.
     """
     try:
-        return _compiled(path, names)
+        return _compiled(source, names)
     except UNKNOWN_INSIDE:
         raise
     except Exception as error:
-        tell_of_source(path, error)
+        tell_of_source(source, error)
         raise
 
 
-def tell_of_source(path: Path, error: Exception) -> None:
-    """Keep a copy of a source beside the folder that it is built in, which goes, and name it in the error."""
-    handle, name = tempfile.mkstemp(prefix="failed-", suffix=".py", dir=path.parent.parent)
-    with open(handle, "wb") as copy:
-        copy.write(path.read_bytes())
-    error.add_note(f"the source of the kernel that could not be compiled is kept in {name}")
+def tell_of_source(source: str, error: Exception) -> None:
+    """Keep a source in the folder for temporary files, and name it in the error."""
+    try:
+        with tempfile.NamedTemporaryFile("w", prefix="failed-", suffix=".py", delete=False) as copy:
+            copy.write(source)
+    except OSError:  # the error is what counts
+        return
+    error.add_note(f"the source of the kernel that could not be compiled is kept in {copy.name}")
 
 
-def _compiled(path: Path, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
+def _compiled(source: str, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     with own_settings():
         from piazzi.kernels.compiler import object_code
 
-        module = import_file(path)
+        module = module_of(source)
         callbacks = {name: getattr(module, name) for name in names}
         objects = {name: object_code(callback) for name, callback in callbacks.items()}
         symbols = {name: (callback.native_name, _kinds(callback)) for name, callback in callbacks.items()}
     return objects, symbols
 
 
-def live_entries(path: Path, names: tuple[str, ...]) -> dict[str, Entry]:
+def live_entries(source: str, names: tuple[str, ...]) -> dict[str, Entry]:
     """The entries as Numba itself loads them, by its public functions alone: there is no object code to keep."""
     with own_settings():
         from piazzi.kernels.compiler import public_way
 
         with public_way():
-            module = import_file(path)
+            module = module_of(source)
         callbacks = {name: getattr(module, name) for name in names}
         return {name: Entry(callback.address, _kinds(callback), callback) for name, callback in callbacks.items()}
 

@@ -7,12 +7,10 @@ import hashlib
 import json
 import logging
 import os
-import tempfile
 import threading
 import time
 import warnings
 from functools import cache
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -75,10 +73,7 @@ def build_seconds() -> float:
 
 def _plain(spec: KernelSpec) -> SimpleNamespace:
     source = spec.source("plain")
-    with tempfile.TemporaryDirectory(prefix="piazzi-") as folder:
-        path = Path(folder) / "kernels.py"
-        path.write_text(source)
-        return SimpleNamespace(**plain_entries(path, entry_names(source)))
+    return SimpleNamespace(**plain_entries(source, entry_names(source)))
 
 
 def _from_disk_or_built(spec: KernelSpec) -> SimpleNamespace:
@@ -120,13 +115,10 @@ def _seal(manifest: dict[str, Any], digest: str) -> str:
 def _build(spec: KernelSpec, place: Folder | None, digest: str) -> dict[str, Any]:
     """Compile, and keep what came of it where that can be done."""
     source = spec.source("compiled")
-    with tempfile.TemporaryDirectory(prefix="piazzi-") as folder:
-        path = Path(folder) / "kernels.py"
-        path.write_text(source)
-        try:
-            objects, symbols = compile_entries(path, entry_names(source))
-        except UNKNOWN_INSIDE as error:
-            return _built_publicly(path, source, error)
+    try:
+        objects, symbols = compile_entries(source, entry_names(source))
+    except UNKNOWN_INSIDE as error:
+        return _built_publicly(source, error)
     if place is not None and may_be_kept():
         try:
             _keep(place, digest, source, objects, symbols)
@@ -135,12 +127,12 @@ def _build(spec: KernelSpec, place: Folder | None, digest: str) -> dict[str, Any
     return dict(load_objects(objects, symbols))
 
 
-def _built_publicly(path: Path, source: str, error: Exception) -> dict[str, Any]:
+def _built_publicly(source: str, error: Exception) -> dict[str, Any]:
     """The entries by public functions of Numba; raises what was wrong first where they do not serve either."""
     try:
-        entries = live_entries(path, entry_names(source))
+        entries = live_entries(source, entry_names(source))
     except Exception:
-        tell_of_source(path, error)
+        tell_of_source(source, error)
         raise error from None
     _warn_of_numba(f"{type(error).__name__}: {error}")
     return dict(entries)
