@@ -75,27 +75,28 @@ def inform(at, stride, own, covariance, rows, lost):
     for i in range(N):
         store_packs(rows, i * N * LANES, load_lanes(covariance, at + i * N, N, stride, LANES), LANES)
     P = load_matrices(own, 0, N, N, stride, LANES)
-    h, missing = next_direction(rows, 0)
-    P = informed(P, h)
-    for j in range(1, N):
+    first = load_packs(rows, 0, 1, LANES)[0]
+    missing = choose(first, first, 1.0, 0.0)  # zero in every lane
+    for j in range(N):
         h, lacks = next_direction(rows, j)
         missing = missing + lacks
         P = informed(P, h)
     store_packs(lost, 0, vector(missing), LANES)
-    together = 0.0
-    for lane in range(LANES):
-        together += lost[lane]
-    if together == 0.0:
-        store_lanes(covariance, at, stride, symmetric(P))
-    else:
-        for lane in range(LANES if stride > 0 else 1):
-            inform_alone(at + lane * stride, lane * stride, own, covariance, rows)
+    lanes = LANES if stride > 0 else 1
+    for lane in range(lanes):
+        if lost[lane] > 0.0:
+            store(rows, lane * NN, load_matrix(covariance, at + lane * stride, N, N))
+    store_lanes(covariance, at, stride, symmetric(P))
+    for lane in range(lanes):
+        if lost[lane] > 0.0:
+            inform_alone(rows, lane * NN, own, lane * stride, covariance, at + lane * stride)
 
 
 @inline
-def inform_alone(at, own_at, own, covariance, rows):
-    """As `inform`, of one state."""
-    root_of(load_matrix(covariance, at, N, N), rows, 0)
+def inform_alone(information, from_here, own, own_at, covariance, at):
+    """As `inform`, of one state, by factors with pivots."""
+    rows = scratch(NN)
+    root_of(load_matrix(information, from_here, N, N), rows, 0)
     P = load_matrix(own, own_at, N, N)
     for j in range(N):
         P = informed(P, load_vector(rows, j * N, N))
