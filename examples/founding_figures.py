@@ -17,7 +17,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 import piazzi as pz
-from piazzi.evaluate.window_trade import head
+from piazzi.evaluate.window_lengths import head
 from piazzi.present.figures import path_beside_truth, timing
 from piazzi.present.figures.pages import save
 from piazzi.present.figures.style import RC

@@ -9,9 +9,9 @@ import pytest
 import sympy as sp
 
 import piazzi as pz
-from piazzi.expressions import Equation, ExpressionError, check, evaluate, evaluate_arrays, from_sympy, symbol, to_sympy
+from piazzi.expressions import Equation, ExpressionError, added, check, evaluate, evaluate_arrays, from_sympy, symbol, to_sympy
 from piazzi.expressions.bounds import read
-from piazzi.expressions.functions import TABLE, Function, added, arities
+from piazzi.expressions.functions import TABLE, Function, arities
 
 SWITCH = Function(
     "switch",

@@ -75,6 +75,58 @@ def test_imports_point_upstream():
     assert not wrong, "\n".join(wrong)
 
 
+def test_no_circle_of_modules():
+    """Imports within functions and those for types alone count: who reads a module has to read what it needs, and no more."""
+    needs = {name: set(modules_imported(name)) - {name} for name in map(name_of, MODULES)}
+    while free := {name for name, needed in needs.items() if not needed & needs.keys()}:
+        needs = {name: needed - free for name, needed in needs.items() if name not in free}
+    reached = {name: reach(name, needs) for name in needs}
+    circles = {
+        frozenset(other for other in found if name in reached[other]) for name, found in reached.items() if name in found
+    }
+    assert not [sorted(circle) for circle in circles if not any(circle <= left for left in LEFT)]
+
+
+# An estimate offers forecast and dataset as methods; the Kalman filter hands wide priors to its square-root form
+LEFT = {
+    frozenset(f"piazzi.estimate.{name}" for name in ("considered", "dataset", "estimator", "forecast")),
+    frozenset(f"piazzi.estimate.{name}" for name in ("kalman", "root")),
+}
+
+
+def name_of(module: Path) -> str:
+    """Dotted name of a module or package."""
+    return ".".join(module.relative_to(SOURCE).with_suffix("").parts).removesuffix(".__init__")
+
+
+NAMES = {name_of(module): module for module in MODULES}
+
+
+def modules_imported(name: str) -> Iterator[str]:
+    """Modules of piazzi that one imports, wherever it does."""
+    for node in ast.walk(ast.parse(NAMES[name].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            named = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert not node.level, f"{name}: relative imports are not looked at"
+            named = [f"{node.module}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        for found in named:
+            parts = found.split(".")
+            yield from [".".join(parts[:i]) for i in range(len(parts), 0, -1) if ".".join(parts[:i]) in NAMES][:1]
+
+
+def reach(name: str, needs: dict[str, set[str]]) -> set[str]:
+    """Every module that one leads to, itself where it does."""
+    found, waiting = set[str](), [name]
+    while waiting:
+        new = needs[waiting.pop()] & needs.keys() - found
+        found |= new
+        waiting += new
+    return found
+
+
 def packages_imported(folder: Path) -> dict[str, str]:
     """Packages of others that files below a folder import by name, with one place for each."""
     own = {"piazzi", "tests", *(file.stem for part in ("docs", "examples") for file in (ROOT / part).rglob("*.py"))}

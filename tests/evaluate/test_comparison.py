@@ -49,6 +49,11 @@ def compared(**results: Any) -> Comparison:
     return compare(first.problem, first.tracking, {name: Ready(r) for name, r in results.items()}, source="here.npz")
 
 
+def parts(comparison: Comparison) -> tuple[Any, ...]:
+    """What tables and sentences are made of."""
+    return comparison.problem.model, comparison.rows, comparison.tracking.values
+
+
 @pytest.fixture
 def good() -> Estimate:
     rng = np.random.default_rng(2)
@@ -331,7 +336,7 @@ def test_errors_of_a_singular_covariance_are_judged_by_its_rank(singular):
     row = comparison.to_dict()["rows"][0]
     assert (row["nees_ideal"], row["nees_ideal_last_half"]) == (41 / 40, 1.0)
     assert row["mean_nees_last_half"] == pytest.approx(np.mean(singular.mean[20:, 0] ** 2))
-    assert [c.unit for c in columns(comparison) if c.name == "mean NEES"] == ["ideal 1.02", "ideal 1"]
+    assert [c.unit for c in columns(*parts(comparison)) if c.name == "mean NEES"] == ["ideal 1.02", "ideal 1"]
     assert "Errors of flat are consistent with the covariance (NEES of this one run)." in str(comparison)
     assert [p.heading for p in points(comparison) if "consistent with" in p.text] == ["Consistent covariance"]
     squares = nees_of(comparison)
@@ -377,7 +382,10 @@ def test_terminal_and_page_pass_the_same_verdict(good, known, thorough):
         results["small"] = replace(bare, innovations=good.innovations / 20)
     first = results["by1"]
     comparison = compare(first.problem, first.tracking, {n: Ready(r) for n, r in results.items()}, thorough=thorough)
-    terminal, page = by_claim(sentences(comparison)), by_claim(p.text for p in points(comparison))
+    terminal, page = (
+        by_claim(sentences(*parts(comparison))),
+        by_claim(p.text for p in points(comparison)),
+    )
     assert terminal == page
     assert [names for claim, names in terminal.items() if claim.startswith("consistent")] == [{"by1"}]
     sizes = {name: float(claim.split()[1]) for claim, names in terminal.items() for name in names if "about" in claim}

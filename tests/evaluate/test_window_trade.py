@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
-from piazzi.evaluate.window_trade import head, steps_of, timed_sizes
+from piazzi.evaluate.window_lengths import head, steps_of, timed_sizes
 from piazzi.present.report import Chart, page, windows_section, windows_tab
 from tests.laws.problems import b612
 

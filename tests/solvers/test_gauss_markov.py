@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.model import with_gauss_markov
 from tests.solvers import orbits
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
@@ -18,7 +17,7 @@ def disturbed(**changes) -> pz.Problem:
 
 
 def test_the_model_says_what_was_added():
-    model = with_gauss_markov(orbits.model(2))
+    model = disturbed().model
     assert model.states == ("x", "y", "vx", "vy", "gm_vx", "gm_vy")
     assert model.dynamics[2].endswith(" + gm_vx")
     assert model.dynamics[4] == "-gm_vx/tau"
@@ -30,7 +29,8 @@ def test_units_are_those_of_rates():
     """Written as everywhere: a power of seconds, never one division after the other."""
     for unit, rate in {"m/s": "m/s^2", "m/s^2": "m/s^3", "1/s": "1/s^2", "m": "m/s", "rad": "rad/s", "": ""}.items():
         model = pz.Model(["v"], ["0"], [pz.Sensor("s", ["v"])], units={"v": unit} if unit else {})
-        assert with_gauss_markov(model, ["v"]).unit("gm_v") == rate
+        problem = pz.Problem(model, pz.Gaussian([0], [1]), stations=[pz.Station("a", "s", 1.0)])
+        assert pz.with_gauss_markov(problem, SIGMA, TAU, ["v"]).model.unit("gm_v") == rate
 
 
 def test_rates_are_those_of_before_plus_the_disturbance():
@@ -92,16 +92,20 @@ def test_constants_groups_and_the_truth_are_kept():
     assert_allclose(tracking.truth[:, 4:6], 0, atol=0)
 
 
+def stepped() -> pz.Problem:
+    return pz.Problem(pz.Model(["q"], ["q"], discrete=True), pz.Gaussian([0], [1]))
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: with_gauss_markov(orbits.model(2), "speed"), "'speed' is not a group"),
-        (lambda: with_gauss_markov(orbits.model(2), ["vq"]), "'vq' is not a state"),
-        (lambda: with_gauss_markov(orbits.model(2), time_constant=-1.0), "time_constant is -1.0"),
+        (lambda: pz.with_gauss_markov(orbits.orbit(2, pz.RungeKutta4()), SIGMA, TAU, "speed"), "'speed' is not a group"),
+        (lambda: pz.with_gauss_markov(orbits.orbit(2, pz.RungeKutta4()), SIGMA, TAU, ["vq"]), "'vq' is not a state"),
+        (lambda: pz.with_gauss_markov(orbits.orbit(2, pz.RungeKutta4()), SIGMA, -1.0), "time_constant -1.0"),
         (lambda: pz.with_gauss_markov(orbits.orbit(2, pz.Kepler()), SIGMA, TAU), "the rate of 'vx'"),
         (lambda: disturbed(process_noise=pz.ProcessNoise([1, 1, 1, 1], "step")), "per second"),
         (lambda: pz.with_gauss_markov(orbits.orbit(2, pz.RungeKutta4()), 0.0, TAU), "must be positive"),
-        (lambda: with_gauss_markov(pz.Model(["q"], ["q"], discrete=True), ["q"]), "needs rates"),
+        (lambda: pz.with_gauss_markov(stepped(), SIGMA, TAU, ["q"]), "needs rates"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):

@@ -8,9 +8,10 @@ import piazzi as pz
 from piazzi.evaluate import evaluate
 from piazzi.evaluate.bounds import posterior_bounds
 from piazzi.simulation import true_problem
+from piazzi.study import Study
 from piazzi.study.bound import bound_at
 from piazzi.study.pieces import run_task
-from piazzi.study.plan import MOST_EPOCHS, Study
+from piazzi.study.plan import MOST_EPOCHS
 from piazzi.study.runs import simulated
 from piazzi.study.score import NUMBERS
 from piazzi.study.tasks import Task

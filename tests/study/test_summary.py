@@ -57,8 +57,7 @@ def test_failed_runs_are_counted_and_left_out(stored):
 
 def test_bounds_of_mean_nees_hold_for_gaussian_errors():
     """99 % of means of M chi-square variables of n degrees of freedom."""
-    from piazzi.study.store import Row
-    from piazzi.study.summary import _course
+    from piazzi.study.summary import Row, _course
 
     rng = np.random.default_rng(0)
     M, T, n = 40, 4000, 4
@@ -70,8 +69,7 @@ def test_bounds_of_mean_nees_hold_for_gaussian_errors():
 
 def test_bounds_of_mean_nees_hold_for_ranks_that_differ():
     """From run to run and from epoch to epoch; where there is no direction, there is no NEES."""
-    from piazzi.study.store import Row
-    from piazzi.study.summary import _course
+    from piazzi.study.summary import Row, _course
 
     rng = np.random.default_rng(1)
     M, T = 10, 4000

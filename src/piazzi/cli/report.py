@@ -84,7 +84,7 @@ def _more(comparison: Comparison, lags: tuple[int, ...], seen: bool) -> tuple[li
 
     problem, tracking, sections, well = comparison.problem, comparison.tracking, [], True
     if lags:
-        from piazzi.evaluate.window_trade import steps_of
+        from piazzi.evaluate.window_lengths import steps_of
 
         with output.progress(steps_of(lags, tracking)) as step:
             trade = windows(problem, tracking, lags, source=comparison.source, announce=step)

@@ -73,7 +73,7 @@ def command(
     ending.check()
     from piazzi.cli.sources import load_source
     from piazzi.evaluate import windows
-    from piazzi.evaluate.window_trade import steps_of
+    from piazzi.evaluate.window_lengths import steps_of
 
     found = load_source(source, seed, scenario)
     problem, tracking = found.problem, found.tracking

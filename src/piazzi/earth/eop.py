@@ -11,12 +11,13 @@ import warnings
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import numpy as np
 
 from piazzi.earth import scales
 from piazzi.earth.delta_t import MODEL, delta_t, delta_t_error
+from piazzi.earth.scales import Pole
 from piazzi.sources import opened
 
 Array = np.ndarray[Any, Any]
@@ -28,21 +29,6 @@ UT1_DRIFT = 1e-3  # s/day by which UT1 may part from its last known rate, from t
 
 class EOPWarning(UserWarning):
     """The orientation of the Earth is not known at this date, or only predicted."""
-
-
-class Pole(NamedTuple):
-    """Pole `xp`, `yp` and offsets `dx`, `dy` of the celestial pole, in radians, with their rates in rad/s."""
-
-    values: Array
-    rates: Array
-
-
-class Orientation(Protocol):
-    """What rotations ask for: UT1 - TAI in seconds, its rate, and the pole, at instants (see `scales`)."""
-
-    def ut1_tai(self, whole: Array, fraction: Array) -> Array: ...
-    def ut1_rate(self, whole: Array, fraction: Array) -> Array: ...
-    def pole(self, whole: Array, fraction: Array) -> Pole: ...
 
 
 @dataclass(frozen=True)

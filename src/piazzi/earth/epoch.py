@@ -6,15 +6,14 @@ import datetime as dt
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import total_ordering
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from piazzi.earth import scales
 from piazzi.earth.dates import HINT, Reading, read_date, scale_named, write_date
-
-if TYPE_CHECKING:
-    from piazzi.earth.eop import Orientation
+from piazzi.earth.eop import tables
+from piazzi.earth.scales import Orientation
 
 _UNIX_DAY = 40587  # MJD of 1970-01-01
 
@@ -57,7 +56,7 @@ class Epoch:
             if scale is not None and reading.scale != scale:
                 raise ValueError(f"date {when!r} is in {reading.scale}, and {scale} was said beside it")
             day, seconds, part = (np.array(value) for value in reading[1:])
-            one, two = scales.to_tt(reading.scale, day, seconds, part)
+            one, two = scales.to_tt(reading.scale, day, seconds, part, _orientation(reading.scale))
             whole, fraction = float(one), float(two)
         object.__setattr__(self, "whole", whole)
         object.__setattr__(self, "fraction", fraction)
@@ -87,7 +86,7 @@ class Epoch:
         reading = np.array(day), np.array(np.floor(seconds)), np.array(seconds - np.floor(seconds))
         if scale == "UTC" and day < scales.UTC_BEGINS:
             raise ValueError(f"JD {one!r} + {two!r}: there is no UTC before 1960; give it in UT1 or TT")
-        one_tt, two_tt = scales.to_tt(scale, *reading)
+        one_tt, two_tt = scales.to_tt(scale, *reading, _orientation(scale))
         return cls.at(float(one_tt), float(two_tt))
 
     def reading(self, scale: str, eop: Orientation | None = None) -> Reading:
@@ -95,7 +94,8 @@ class Epoch:
         scale = scale_named(scale, str(scale))
         if scale == "UTC" and self.whole < -1262347200.0 + 30.0:
             raise ValueError(f"{self.to('TT')}: there is no UTC before 1960; ask for UT1 or TT")
-        day, seconds, fraction = scales.reading(scale, np.array(self.whole), np.array(self.fraction), eop)
+        instant = np.array(self.whole), np.array(self.fraction)
+        day, seconds, fraction = scales.reading(scale, *instant, _orientation(scale, eop))
         return Reading(scale, float(day), float(seconds), float(fraction))
 
     def to(self, scale: str, eop: Orientation | None = None, digits: int = 9) -> str:
@@ -145,6 +145,11 @@ class Epoch:
 
     def __repr__(self) -> str:
         return f"Epoch({str(self)!r})"
+
+
+def _orientation(scale: str, eop: Orientation | None = None) -> Orientation | None:
+    """The tables of the IERS where UT1 is asked for and nothing else is given; nobody else waits for them."""
+    return tables() if scale == "UT1" and eop is None else eop
 
 
 def _reading(when: Any, scale: str | None) -> Reading:

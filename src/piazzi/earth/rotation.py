@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from piazzi.earth import scales
-from piazzi.earth.eop import Orientation, tables
+from piazzi.earth.eop import tables
 from piazzi.earth.epoch import Epoch, pairs
+from piazzi.earth.scales import Orientation
 
 Array = np.ndarray[Any, Any]
 

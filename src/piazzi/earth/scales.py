@@ -11,12 +11,9 @@ Sources: IERS Conventions 2010, ch. 10 (TT, TCG, TDB); IAU SOFA Time Scale and C
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from piazzi.earth.eop import Orientation
 
 Array = np.ndarray[Any, Any]
 
@@ -28,6 +25,21 @@ TT_TAI = 32.184
 _BEHIND_TT = {"TT": (0.0, 0.0), "TAI": (32.0, 0.184), "GPS": (51.0, 0.184)}  # whole seconds and the rest
 _TCG_EPOCH = 43144.0 + TT_TAI / DAY  # MJD of TT at which TT, TCG and TDB agreed: 1977-01-01T00:00:00 TAI
 _L_G = 6.969290134e-10  # IAU 2000 resolution B1.9
+
+
+class Pole(NamedTuple):
+    """Pole `xp`, `yp` and offsets `dx`, `dy` of the celestial pole, in radians, with their rates in rad/s."""
+
+    values: Array
+    rates: Array
+
+
+class Orientation(Protocol):
+    """What time scales and rotations ask for: UT1 - TAI in seconds, its rate, and the pole, at instants."""
+
+    def ut1_tai(self, whole: Array, fraction: Array) -> Array: ...
+    def ut1_rate(self, whole: Array, fraction: Array) -> Array: ...
+    def pole(self, whole: Array, fraction: Array) -> Pole: ...
 
 
 def normal(whole: Array, fraction: Array) -> tuple[Array, Array]:
@@ -63,7 +75,7 @@ def length_of_day(day: Array) -> Array:
 def to_tt(
     scale: str, day: Array, seconds: Array, fraction: Array, orientation: Orientation | None = None
 ) -> tuple[Array, Array]:
-    """The instants of readings of `scale`; `orientation` gives UT1 (default: the tables)."""
+    """The instants of readings of `scale`; UT1 needs an `orientation`."""
     whole = (day - 51544.0) * DAY - DAY / 2 + seconds
     if scale in ("TDB", "TCG", "UT1"):
         guess = normal(whole, fraction)
@@ -118,6 +130,5 @@ def offset(scale: str, whole: Array, fraction: Array, orientation: Orientation |
         return np.asarray(-_L_G / (1.0 - _L_G) * since)
     if scale == "TDB":
         return np.asarray(-erfa.dtdb(jd, part, np.mod(part + 0.5, 1.0), 0.0, 0.0, 0.0))  # at the geocentre
-    from piazzi.earth.eop import tables
-
-    return np.asarray(TT_TAI - (tables() if orientation is None else orientation).ut1_tai(whole, fraction))
+    assert orientation is not None
+    return np.asarray(TT_TAI - orientation.ut1_tai(whole, fraction))

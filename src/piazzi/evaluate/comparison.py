@@ -9,10 +9,13 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from piazzi.estimate import Estimate, Estimator
 from piazzi.estimate.estimator import views_of
 from piazzi.estimate.registry import by_name
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
+from piazzi.evaluate.dataset import numbers
 from piazzi.evaluate.display import html, render
 from piazzi.evaluate.grids import as_text
 from piazzi.evaluate.honesty import LONGEST
@@ -80,15 +83,19 @@ class Comparison:
 
     def to_dataset(self) -> xarray.Dataset:
         """Every number of the rows, labelled by estimator and view, with units."""
-        from piazzi.evaluate.dataset import comparison_to_dataset
+        import xarray as xr
 
-        return comparison_to_dataset(self)
+        labels = ("estimator", "view", "message")
+        texts = {k: (("row",), np.array([getattr(r, k) for r in self.rows], dtype=object)) for k in labels}
+        variables: dict[str, Any] = {k: (("row",), v, units) for k, v, units in numbers(self.problem.model, self.rows)}
+        variables["message"] = texts.pop("message")
+        return xr.Dataset(variables, texts, {"source": self.source, "epochs": len(self.tracking.times)})
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        return render(self, console, options)
+        return render(self.problem.model, self.rows, self.tracking.values, console, options)
 
     def _repr_html_(self) -> str:
-        return html(self)
+        return html(self.problem.model, self.rows, self.tracking.values)
 
     def __str__(self) -> str:
         return as_text(self)

@@ -15,8 +15,8 @@ from piazzi.text import printable
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
 
-    from piazzi.evaluate.comparison import Comparison
     from piazzi.evaluate.rows import Row
+    from piazzi.problem.checks import Array
 
 _VIEW = {"realtime": "real time", "delayed": "delayed"}
 TESTS, PASSED, BOUND = "tests failed", "none", "bound"
@@ -37,28 +37,22 @@ class Column:
         return f"{self.name}, {self.part}" if self.part else self.name
 
 
-def group_display(comparison: Comparison, group: str) -> Display:
-    """The unit to show the errors of a group of states in, one for all rows."""
-    return row_display(comparison.problem.model, comparison.rows, group)
-
-
 def row_display(model: Model, rows: Iterable[Row], group: str) -> Display:
     """The unit to show the errors of a group of a model's states in, one for all these rows."""
     unit = unit_of(model.unit(s) for s in dict(model.groups).get(group, (group,)))
     return display_of(unit, [v for r in rows for v in (r.rmse.get(group), r.rmse_last_half.get(group))])
 
 
-def columns(comparison: Comparison) -> list[Column]:
-    """Everything the table shows; columns without any value are left out."""
-    rows = comparison.rows
+def columns(model: Model, rows: Sequence[Row], values: Array) -> list[Column]:
+    """Everything the table shows of rows about the measurements (J, m); columns without any value are left out."""
     found = [
         Column("estimator", "", "", tuple(printable(r.estimator) for r in rows)),
         Column("view", "", "", tuple(_VIEW.get(r.view, r.view) for r in rows)),
     ]
     for group in dict.fromkeys(g for r in rows for g in r.rmse):
-        show = group_display(comparison, group)
-        for part, values in (("whole run", [r.rmse for r in rows]), ("last half", [r.rmse_last_half for r in rows])):
-            shown = (number(_times(v.get(group), show.factor)) for v in values)
+        show = row_display(model, rows, group)
+        for part, errors in (("whole run", [r.rmse for r in rows]), ("last half", [r.rmse_last_half for r in rows])):
+            shown = (number(_times(e.get(group), show.factor)) for e in errors)
             found.append(Column(f"{printable(group)} RMSE", part, printable(show.unit), tuple(shown)))
         bounds = (number(_times(r.crlb_last_half.get(group), show.factor)) for r in rows)
         found.append(Column(f"{printable(group)} {BOUND}", "last half", printable(show.unit), tuple(bounds)))
@@ -66,7 +60,7 @@ def columns(comparison: Comparison) -> list[Column]:
     found += [
         Column("mean NEES", "whole run", whole, tuple(number(r.mean_nees, 3) for r in rows)),
         Column("mean NEES", "last half", half, tuple(number(r.mean_nees_last_half, 3) for r in rows)),
-        Column("mean NIS", "", ideal([expected_nis(comparison.tracking.values)]), tuple(number(r.mean_nis, 3) for r in rows)),
+        Column("mean NIS", "", ideal([expected_nis(values)]), tuple(number(r.mean_nis, 3) for r in rows)),
         Column(TESTS, "", "5 % each", tuple(", ".join(failing(r)) or (PASSED if tested(r) else "") for r in rows)),
         Column("iterations", "", "", tuple(str(r.iterations) if r.iterations else NOTHING for r in rows)),
         Column("time", "", "", tuple(duration(r.seconds) for r in rows)),
@@ -83,17 +77,17 @@ def _remark(row: Row) -> str:
     return "FAILED" if not row.success else "diverged" if row.diverged else ""
 
 
-def html(comparison: Comparison) -> str:
+def html(model: Model, rows: Sequence[Row], values: Array) -> str:
     """The table and its sentences for a notebook; all text is escaped."""
-    shown = columns(comparison)
+    shown = columns(model, rows, values)
     head = "".join(f"<th>{escape(c.title)}{f'<br><small>{escape(c.unit)}</small>' if c.unit else ''}</th>" for c in shown)
-    rows = zip(*(c.texts for c in shown), strict=True)
-    body = "".join("<tr>" + "".join(f"<td>{escape(v)}</td>" for v in row) + "</tr>" for row in rows)
-    says = "".join(f"<p>{escape(line)}</p>" for line in sentences(comparison))
+    cells = zip(*(c.texts for c in shown), strict=True)
+    body = "".join("<tr>" + "".join(f"<td>{escape(v)}</td>" for v in row) + "</tr>" for row in cells)
+    says = "".join(f"<p>{escape(line)}</p>" for line in sentences(model, rows, values))
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{says}"
 
 
-def render(comparison: Comparison, console: Console, options: ConsoleOptions) -> RenderResult:
+def render(model: Model, rows: Sequence[Row], values: Array, console: Console, options: ConsoleOptions) -> RenderResult:
     """The comparison for rich, then its sentences.
 
     All columns where they fit the width; else those of the last half; else without bounds and tests; else a block of lines for
@@ -102,7 +96,7 @@ def render(comparison: Comparison, console: Console, options: ConsoleOptions) ->
     from rich.measure import Measurement
     from rich.text import Text
 
-    everything = columns(comparison)
+    everything = columns(model, rows, values)
     fewer = [c for c in everything if c.part != "whole run" and c.name != "iterations"]
     least = [c for c in fewer if c.name != TESTS and not c.name.endswith(BOUND)]
     for chosen in (everything, fewer, least):
@@ -115,7 +109,7 @@ def render(comparison: Comparison, console: Console, options: ConsoleOptions) ->
             break
     else:
         yield from blocks(everything)
-    for line in sentences(comparison):
+    for line in sentences(model, rows, values):
         yield Text(line)
 
 
@@ -160,21 +154,21 @@ def _style(value: str) -> str:
 # ---- what it means -------------------------------------------------------------------------------------------------------
 
 
-def sentences(comparison: Comparison) -> list[str]:
+def sentences(model: Model, rows: Sequence[Row], values: Array) -> list[str]:
     """What the table means, in plain words: who is best, whose covariance is consistent, who failed."""
-    judged = sound(comparison.rows)
-    out = [f"{r.estimator} did not succeed: {r.message}." for r in comparison.rows if not r.success]
-    diverged = dict.fromkeys(r.estimator for r in comparison.rows if r.success and r.diverged)
+    judged = sound(rows)
+    out = [f"{r.estimator} did not succeed: {r.message}." for r in rows if not r.success]
+    diverged = dict.fromkeys(r.estimator for r in rows if r.success and r.diverged)
     out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down enough." for name in diverged]
-    out += dict.fromkeys(f"{r.estimator}: {r.message}." for r in comparison.rows if r.success and r.message)
-    out += [*_rejected(comparison), *_modes(comparison)]
+    out += dict.fromkeys(f"{r.estimator}: {r.message}." for r in rows if r.success and r.message)
+    out += [*_rejected(rows, len(values)), *_modes(rows)]
     known = errors_known(judged)
     if known:
-        out += _best(comparison, judged)
+        out += _best(model, rows, judged)
     elif judged:
         out.append("There is no truth to compare with, so errors are unknown.")
     what, basis = ("Errors", "NEES of this one run") if known else ("Innovations", "NIS")
-    for claim in claims(comparison.rows, comparison.tracking.values):
+    for claim in claims(rows, values):
         names = _list([_named(r, judged) for r in claim.rows])
         out.append(f"{what} of {names} are {claim.text} ({basis}).")
     return [printable(line) for line in [*out, *_tested(judged)]]
@@ -196,19 +190,18 @@ def _tested(rows: Sequence[Row]) -> list[str]:
     return out + ([f"Over the whole run the errors of {_list(early)} are inconsistent with the covariance."] if early else [])
 
 
-def _rejected(comparison: Comparison) -> list[str]:
-    """How many rows each gate left out."""
-    total = len(comparison.tracking.row_times)
-    counts = {r.estimator: r.rejected for r in comparison.rows if r.rejected is not None}
+def _rejected(rows: Sequence[Row], total: int) -> list[str]:
+    """How many of all measurements each gate left out."""
+    counts = {r.estimator: r.rejected for r in rows if r.rejected is not None}
     out = [f"The gate of {name} rejected {count:,} of {total:,} measurements." for name, count in counts.items()]
-    counts = {r.estimator: r.outliers for r in comparison.rows if r.outliers is not None}
+    counts = {r.estimator: r.outliers for r in rows if r.outliers is not None}
     return out + [f"{name} classified {count:,} of {total:,} measurements as outliers." for name, count in counts.items()]
 
 
-def _modes(comparison: Comparison) -> list[str]:
+def _modes(rows: Sequence[Row]) -> list[str]:
     """How probable each of several solutions is."""
     out = []
-    for row in comparison.rows:
+    for row in rows:
         if row.modes and len(row.modes) > 1:
             shares = [f"{100 * mode['probability']:.3g} %" for mode in row.modes[:4]]
             more = f" and {len(row.modes) - 4} more" if len(row.modes) > 4 else ""
@@ -216,10 +209,10 @@ def _modes(comparison: Comparison) -> list[str]:
     return out
 
 
-def _best(comparison: Comparison, rows: Sequence[Row]) -> list[str]:
-    group = next(g for r in rows for g, v in r.rmse_last_half.items() if v is not None)
-    ranked = [(v, r.estimator, r.view) for r in rows if (v := r.rmse_last_half.get(group)) is not None]
-    show = group_display(comparison, group)
+def _best(model: Model, rows: Sequence[Row], judged: Sequence[Row]) -> list[str]:
+    group = next(g for r in judged for g, v in r.rmse_last_half.items() if v is not None)
+    ranked = [(v, r.estimator, r.view) for r in judged if (v := r.rmse_last_half.get(group)) is not None]
+    show = row_display(model, rows, group)
     ranked.sort(key=lambda found: float(f"{found[0]:.3e}"))  # a difference that is not shown is no difference
     value, name, view = ranked[0]
     error = f"{number(value * show.factor)}{show.suffix}"

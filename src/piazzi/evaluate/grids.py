@@ -41,7 +41,17 @@ class Grid:
         return Grid(self.title, tuple(self.heads[i] for i in kept), rows, left)
 
 
-def as_rich(grid: Grid, console: Console, options: ConsoleOptions) -> Iterable[Any]:
+def as_rich(grids: Sequence[Grid], sentences: Sequence[str], console: Console, options: ConsoleOptions) -> Iterable[Any]:
+    """Tables and sentences for rich."""
+    from rich.text import Text
+
+    for grid in grids:
+        yield from _fitted(grid, console, options)
+    for line in sentences:
+        yield Text(line)
+
+
+def _fitted(grid: Grid, console: Console, options: ConsoleOptions) -> Iterable[Any]:
     """The title and a table for rich, without spare columns where it would be too wide; then each row as a block of lines."""
     from rich.measure import Measurement
     from rich.text import Text

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from piazzi import kernels
+from piazzi.evaluate.quantities import finite
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs
@@ -31,6 +33,43 @@ class Shot:
     innovations: Array
     rows: Array
     states: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """Fisher information of the first state as the singular values of its root, each state in units of its prior sigma.
+
+    A singular value s of a direction means that measurements alone tell it to 1/s prior sigmas.
+
+    Attributes
+    ----------
+    singular_values : (n,), falling, zero where a direction cannot be seen
+    directions : (n, n), the unit vector of each singular value in a row, states in units of `Observability.scale`
+    crlb_sigma : (n,), Cramer-Rao standard deviation of each state, SI units, infinite where it cannot be seen
+    """
+
+    singular_values: Array
+    directions: Array
+    crlb_sigma: Array
+
+    @property
+    def condition(self) -> float:
+        """Largest singular value over smallest, infinite where one is zero."""
+        low = float(self.singular_values[-1])
+        return float(self.singular_values[0]) / low if low > 0 else float("inf")
+
+    @property
+    def blind(self) -> int:
+        """How many directions cannot be seen."""
+        return int((self.singular_values == 0).sum())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The information as JSON keeps it."""
+        return {
+            "singular_values": self.singular_values.tolist(),
+            "condition": finite(self.condition),
+            "crlb_sigma": [finite(v) for v in self.crlb_sigma.tolist()],
+        }
 
 
 def along(problem: Problem, inputs: Inputs, states: Array) -> Shot:

@@ -1,58 +1,30 @@
-"""Whether the first state can be seen at all, how well, and whether it is the only one that fits."""
+"""What the measurements say about the first state: numbers, a verdict, tables."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.estimate import FactorGraph
-from piazzi.evaluate.attempts import Attempt, attempts
-from piazzi.evaluate.bounds import full_truth
-from piazzi.evaluate.grids import as_text
-from piazzi.evaluate.information import along, bound, factor, growth, singular
-from piazzi.evaluate.quantities import finite
-from piazzi.evaluate.twins import Twin, find_twins
-from piazzi.evaluate.verdict import verdict, weakest
-from piazzi.model import Sensor
-from piazzi.problem import Problem, ProcessNoise, Station, Tracking
+from piazzi.evaluate.attempts import Attempt
+from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
+from piazzi.evaluate.information import Information
+from piazzi.evaluate.quantities import display_of, finite, number
+from piazzi.evaluate.twins import Twin
+from piazzi.evaluate.verdict import FEEBLE, conclusion, local, twins_found, unreliable, weakest
+from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
-from piazzi.problem.inputs import Inputs, prepare
+from piazzi.text import printable
 
 if TYPE_CHECKING:
     import xarray
     from rich.console import Console, ConsoleOptions, RenderResult
 
 SCHEMA = "piazzi.observability/1"
-Addition = Station | tuple[Sensor, Station]
-_POINTS = 400  # epochs after which the growing information is kept
-
-
-@dataclass(frozen=True, eq=False)
-class Information:
-    """Fisher information of the first state as the singular values of its root, each state in units of its prior sigma.
-
-    A singular value s of a direction means that measurements alone tell it to 1/s prior sigmas.
-
-    Attributes
-    ----------
-    singular_values : (n,), falling, zero where a direction cannot be seen
-    directions : (n, n), the unit vector of each singular value in a row, states in units of `Observability.scale`
-    crlb_sigma : (n,), Cramer-Rao standard deviation of each state, SI units, infinite where it cannot be seen
-    """
-
-    singular_values: Array
-    directions: Array
-    crlb_sigma: Array
-
-    @property
-    def condition(self) -> float:
-        """Largest singular value over smallest, infinite where one is zero."""
-        low = float(self.singular_values[-1])
-        return float(self.singular_values[0]) / low if low > 0 else float("inf")
+_LISTED = 8  # twins in the table
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +88,21 @@ class Observability:
     @property
     def verdict(self) -> str:
         """All of it in plain words."""
-        return verdict(self)
+        model, noise = self.problem.model, self.without_noise is not None
+        count = int((~np.isnan(self.tracking.values)).sum())
+        parts = [
+            *unreliable(self.message),
+            *local(model, self.information, self.weakest_direction, self.since, noise=noise),
+            *twins_found(model.names, self.twins, count, continuum=self.information.blind > 0),
+            *conclusion(self.attempts, model.n, blind=self.information.blind > 0),
+        ]
+        return printable(" ".join(parts))
+
+    @property
+    def since(self) -> float | None:
+        """Time, s, from which on the measurements determine every direction better than the prior; None for never."""
+        better = np.flatnonzero(self.growth_values[:, -1] > FEEBLE)
+        return float(self.growth_times[better[0]]) if better.size else None
 
     def to_dict(self) -> dict[str, Any]:
         """The object of schema piazzi.observability/1; what is infinite is None."""
@@ -127,9 +113,9 @@ class Observability:
             "states": list(model.names),
             "epochs": len(self.tracking.times),
             "prior_time": self.problem.prior_start(self.tracking.times),
-            **_information(self.information),
+            **self.information.to_dict(),
             "weakest_direction": self.weakest_direction,
-            "twins": [_twin(twin) for twin in self.twins],
+            "twins": [twin.to_dict() for twin in self.twins],
             "verdict": self.verdict,
             "about": self.about,
             "success": self.success,
@@ -137,7 +123,7 @@ class Observability:
             "state": self.state.tolist(),
             "units": {name: model.unit(name) for name in model.names},
             "scale": self.scale.tolist(),
-            "without_process_noise": None if self.without_noise is None else _information(self.without_noise),
+            "without_process_noise": None if self.without_noise is None else self.without_noise.to_dict(),
             "attempts": [attempt.to_dict() for attempt in self.attempts],
             "growth": {
                 "times": self.growth_times.tolist(),
@@ -153,160 +139,90 @@ class Observability:
 
     def to_dataset(self) -> xarray.Dataset:
         """Singular values, directions, bounds and their growth with names and units."""
-        from piazzi.evaluate.dataset import observability_to_dataset
+        import xarray as xr
 
-        return observability_to_dataset(self)
+        model, twins = self.problem.model, self.twins
+        variables: dict[str, Any] = {
+            "first_state": (("state",), self.state),
+            "scale": (("state",), self.scale, {"long_name": "unit of each state in directions"}),
+            "crlb_sigma": (("state",), self.crlb_sigma, {"long_name": "Cramer-Rao standard deviation"}),
+            "singular_value": (("direction",), self.singular_values),
+            "direction_vector": (("direction", "state"), self.information.directions),
+            "singular_value_growth": (("time", "direction"), self.growth_values),
+            "crlb_sigma_growth": (("time", "state"), self.growth_sigma),
+            "twin_state": (("twin", "state"), np.array([t.state for t in twins]).reshape(-1, model.n)),
+            "twin_misfit": (("twin",), np.array([t.misfit for t in twins]), {"long_name": "RMS difference in sigma"}),
+        }
+        coordinates = {
+            "state": ("state", np.array(model.names, dtype=object)),
+            "unit": ("state", np.array([model.unit(name) for name in model.names], dtype=object)),
+            "time": ("time", self.growth_times, {"units": "s"}),
+        }
+        return xr.Dataset(variables, coordinates, {"source": self.source, "about": self.about, "verdict": self.verdict})
 
-    def _repr_html_(self) -> str:
-        from piazzi.evaluate.observable_display import html
+    def grids(self) -> list[Grid]:
+        """The first state with its bounds; the directions with their singular values; the twins."""
+        return [_states(self), _directions(self), *([_twins(self)] if self.twins else [])]
 
-        return html(self)
+    def sentences(self) -> list[str]:
+        """The verdict, and what further stations would change, one sentence a line."""
+        out = _split(self.verdict)
+        if self.added is not None:
+            names = ", ".join(s.name for s in self.added.problem.stations[len(self.problem.stations) :])
+            out.append(f"With {names} too:")
+            out += [line for line in _split(self.added.verdict) if line.startswith(("Observability", "Twin"))]
+        return out
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        from piazzi.evaluate.observable_display import render
+        return as_rich(self.grids(), self.sentences(), console, options)
 
-        return render(self, console, options)
+    def _repr_html_(self) -> str:
+        return as_html(self.grids(), self.sentences())
 
     def __str__(self) -> str:
         return as_text(self)
 
 
-def _information(found: Information) -> dict[str, Any]:
-    return {
-        "singular_values": found.singular_values.tolist(),
-        "condition": finite(found.condition),
-        "crlb_sigma": [finite(v) for v in found.crlb_sigma.tolist()],
-    }
+def _split(text: str) -> list[str]:
+    return re.split(r"(?<=[.:]) (?=[A-Z])", text)
 
 
-def _twin(twin: Twin) -> dict[str, Any]:
-    return {"state": twin.state.tolist(), "misfit": twin.misfit, "prior_distance": twin.prior_distance}
+def _states(found: Observability) -> Grid:
+    model, more = found.problem.model, found.added
+    heads = ["state", f"first state\n({found.about})", "prior sigma", "Cramer-Rao\nsigma"]
+    heads += [] if found.without_noise is None else ["without\nprocess noise"]
+    heads += [] if more is None else ["with the\nfurther stations"]
+    rows = []
+    sigma = np.sqrt(np.diag(found.problem.covariance))
+    for i, name in enumerate(model.names):
+        show = display_of(model.unit(name), [found.state[i]])
+        values = [found.state[i], sigma[i], found.crlb_sigma[i]]
+        values += [] if found.without_noise is None else [found.without_noise.crlb_sigma[i]]
+        values += [] if more is None else [more.crlb_sigma[i]]
+        rows.append((name, *(number(float(v) * show.factor, 4) for v in values), show.unit))
+    return Grid("First state, and how well the measurements alone determine it", (*heads, "unit"), tuple(rows))
 
 
-def observability(
-    problem: Problem,
-    tracking: Tracking,
-    *,
-    add: Sequence[Addition] = (),
-    twins: bool = True,
-    source: str = "",
-) -> Observability:
-    """What the measurements say about the first state, at the truth (where it is not known, at the factor graph's estimate).
-
-    Estimated constants count as states.  The information is that of the measurements alone, without prior, with the process
-    noise that the problem assumes taken into account, so that the Cramer-Rao sigma is a bound for the problem as it is
-    estimated; `without_noise` has the textbook matrix H Phi.
-
-    Parameters
-    ----------
-    problem : Problem
-    tracking : Tracking
-    add : stations that measure at every epoch too, each alone or with a sensor that the model does not have, (sensor, station)
-        `Observability.added` tells what they would change.
-    twins : whether to look for other first states with the same measurements
-    source : where the measurements came from, for the record
-
-    Raises
-    ------
-    ValueError
-        Where the tracking does not fit the problem, a station of `add` does not fit the model or has a name that is taken, or
-        there is neither truth nor a finite estimate.
-    """
-    inputs = prepare(problem, tracking)
-    more = _with_stations(problem, add) if add else None
-    states, about, message = _about(problem, tracking)
-    found = _observability(problem, tracking, inputs, states, about, twins, source)
-    found = replace(found, attempts=attempts(problem, tracking, found.twins), message=message)
-    if more is None:
-        return found
-    wider = _with_rows(tracking, problem, more)
-    return replace(found, added=_observability(more, wider, prepare(more, wider), states, about, twins, source))
+def _directions(found: Observability) -> Grid:
+    names, more = found.problem.model.names, found.added
+    heads = ["", "singular\nvalue", *names]
+    rows = [_direction(v, d) for v, d in zip(found.singular_values, found.information.directions, strict=True)]
+    if more is not None:
+        heads.insert(2, "with the\nfurther stations")
+        rows = [(*row[:2], number(float(v), 4), *row[2:]) for row, v in zip(rows, more.singular_values, strict=True)]
+    rows[0], rows[-1] = ("best seen", *rows[0][1:]), ("worst seen", *rows[-1][1:])
+    return Grid("Directions of the first state, in prior sigmas, and their information", tuple(heads), tuple(rows))
 
 
-def _with_stations(problem: Problem, add: Sequence[Addition]) -> Problem:
-    sensors = [part for item in add if isinstance(item, tuple) for part in item[:1]]
-    stations = [item[1] if isinstance(item, tuple) else item for item in add]
-    model = replace(problem.model, sensors=(*problem.model.sensors, *sensors)) if sensors else problem.model
-    return replace(problem, model=model, stations=[*problem.stations, *stations])
+def _direction(value: float, direction: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[str, ...]:
+    return ("", number(float(value), 4), *(f"{c:+.3f}" for c in direction))
 
 
-def _about(problem: Problem, tracking: Tracking) -> tuple[Array, str, str]:
-    """States to linearise about (K, n), what they are, and why they may be wrong."""
-    truth = full_truth(problem, tracking)
-    if truth is not None:
-        return truth, "truth", ""
-    estimate = FactorGraph().estimate(problem, tracking)
-    if not np.isfinite(estimate.mean).all():
-        raise ValueError(f"there is no truth, and the factor graph has no estimate to take its place: {estimate.message}")
-    return estimate.mean, "estimate", "" if estimate.success else estimate.message
-
-
-def _observability(
-    problem: Problem, tracking: Tracking, inputs: Inputs, states: Array, about: str, twins: bool, source: str
-) -> Observability:
-    sigma = np.sqrt(np.diag(problem.covariance))
-    scale = np.where(sigma > 0, sigma, 1.0)
-    rows = _finite(along(problem, inputs, states).rows * scale)
-    total = _summary(factor(rows), scale)
-    epochs = _epochs(inputs.epochs)
-    values, directions = singular(growth(rows, inputs.first_row[epochs + 1] * inputs.z.shape[1]))
-    quiet = None
-    if problem.process_noise.covariance.any():
-        still = replace(problem, process_noise=ProcessNoise(np.zeros(len(problem.model.states)), "step"), truth=None)
-        quiet = _summary(factor(_finite(along(still, inputs, states).rows * scale)), scale)
-    root = factor(rows)
-    others = find_twins(problem, inputs, states[0], scale, root) if twins else ()
-    return Observability(
-        problem,
-        tracking,
-        source,
-        about,
-        states[0].copy(),
-        scale,
-        total,
-        quiet,
-        inputs.t[epochs],
-        values,
-        bound(values, directions) * scale,
-        others,
-    )
-
-
-def _finite(rows: Array) -> Array:
-    bad = ~np.isfinite(rows).all(axis=1)
-    if bad.any():
-        raise ValueError(f"measurement {int(np.argmax(bad))} has no derivative where the problem is linearised")
-    return rows
-
-
-def _summary(root: Array, scale: Array) -> Information:
-    values, directions = singular(root)
-    largest = np.take_along_axis(directions, np.abs(directions).argmax(axis=1)[:, None], axis=1)
-    directions = directions * np.sign(largest)
-    return Information(values, directions, bound(values, directions) * scale)
-
-
-def _epochs(K: int) -> Array:
-    """Epochs to tell the growth after: all where there are few, else ever fewer of them, with some spread evenly."""
-    if K <= _POINTS:
-        return np.arange(K)
-    half = _POINTS // 2
-    return np.unique(np.concatenate([np.geomspace(1, K, half), np.linspace(1, K, half)]).round().astype(np.int64)) - 1
-
-
-def _with_rows(tracking: Tracking, problem: Problem, more: Problem) -> Tracking:
-    """The tracking with a row for each further station at every epoch, behind those that are there.
-
-    Their values are of no account, as long as they are there.
-    """
-    width, new = more.model.width, more.stations[len(problem.stations) :]
-    K, S = len(tracking.times), len(more.stations) - len(problem.stations)
-    extra = np.full((S, width), np.nan)
-    for s, station in enumerate(new):
-        extra[s, : len(station.noise)] = 0.0
-    old = tracking.row_stations if tracking.row_stations is not None else [problem.stations[0].name] * len(tracking.row_times)
-    times = np.concatenate([tracking.row_times, np.repeat(tracking.times, S)])
-    order = np.argsort(times, kind="stable")
-    values = np.concatenate([tracking.padded(width), np.tile(extra, (K, 1))])[order]
-    names = np.concatenate([old, np.tile([s.name for s in new], K)])[order]
-    return Tracking(times[order], values, names, tracking.truth, tracking.epoch)
+def _twins(found: Observability) -> Grid:
+    names = found.problem.model.names
+    rows = []
+    for i, twin in enumerate(found.twins[:_LISTED]):
+        distance = "-" if twin.prior_distance is None else number(twin.prior_distance, 3)
+        rows.append((str(i + 1), number(twin.misfit, 2), distance, *(number(float(v), 5) for v in twin.state)))
+    heads = ("twin", "misfit\n[sigma]", "from prior\n[sigma]", *names)
+    return Grid("Other first states with (nearly) the same measurements", heads, tuple(rows))

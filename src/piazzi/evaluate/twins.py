@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,10 @@ class Twin:
     state: Array
     misfit: float
     prior_distance: float | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The twin as JSON keeps it."""
+        return {"state": self.state.tolist(), "misfit": self.misfit, "prior_distance": self.prior_distance}
 
 
 def find_twins(problem: Problem, inputs: Inputs, first: Array, unit: Array, root: Array) -> tuple[Twin, ...]:

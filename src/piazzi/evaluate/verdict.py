@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from piazzi.estimate.chi_square import quantile
+from piazzi.evaluate.attempts import Attempt
+from piazzi.evaluate.information import Information
 from piazzi.evaluate.judgement import CLEARLY
 from piazzi.evaluate.quantities import display_of, number
+from piazzi.evaluate.twins import Twin
+from piazzi.model import Model
 from piazzi.problem.checks import Array
-from piazzi.text import printable
-
-if TYPE_CHECKING:
-    from piazzi.evaluate.observable import Observability
 
 _SHOWN = 0.1  # smallest component of a direction that is worth telling
-_FEEBLE = 1.0  # singular value up to which the measurements tell less than the prior
+FEEBLE = 1.0  # singular value up to which the measurements tell less than the prior
 _LUCK = 0.999  # share of matched runs, of errors that never change their direction, that stay within what counts as attained
 _FAR = 5.0  # prior sigmas from which a twin is ruled out
 _LISTED = 4  # twins that are told one by one
@@ -30,17 +29,18 @@ def weakest(names: Sequence[str], direction: Array) -> dict[str, float]:
     return {names[i]: round(float(direction[i]), 6) for i in order if abs(direction[i]) >= _SHOWN}
 
 
-def verdict(found: Observability) -> str:
-    """What was found and what follows from it, in sentences."""
-    doubt = f"Unreliable: the factor graph, whose estimate replaces the unknown truth, did not succeed: {found.message}."
-    doubts = [] if found.success else [doubt]
-    return printable(" ".join([*doubts, *_local(found), *_twins(found), *_conclusion(found)]))
+def unreliable(message: str) -> list[str]:
+    """That there is no truth, and no estimate to take its place, where `message` says why."""
+    reason = "the factor graph, whose estimate replaces the unknown truth, did not succeed"
+    return [f"Unreliable: {reason}: {message}."] if message else []
 
 
-def _local(found: Observability) -> list[str]:
-    values, model = found.singular_values, found.problem.model
-    blind = int((values == 0).sum())
-    direction = " ".join(f"{c:+.2f} {name}" for name, c in found.weakest_direction.items())
+def local(
+    model: Model, found: Information, weakest_direction: Mapping[str, float], since: float | None, *, noise: bool
+) -> list[str]:
+    """Whether the first state is observable, and to what sigma; `since` when, and whether process noise is assumed."""
+    blind = found.blind
+    direction = " ".join(f"{c:+.2f} {name}" for name, c in weakest_direction.items())
     if blind:
         unseen = [name for name, s in zip(model.names, found.crlb_sigma.tolist(), strict=True) if not np.isfinite(s)]
         many = f"{blind} of {model.n} directions of the first state {'is' if blind == 1 else 'are'} not observable"
@@ -49,31 +49,26 @@ def _local(found: Observability) -> list[str]:
     for name, s in zip(model.names, found.crlb_sigma.tolist(), strict=True):
         show = display_of(model.unit(name), [s])
         sigmas.append(f"{name} {number(s * show.factor, 3)}{show.suffix}")
-    smallest = float(values[-1])
-    how = "to" if smallest > _FEEBLE else "only to"
-    better = np.flatnonzero(found.growth_values[:, -1] > _FEEBLE)
-    since = (
-        f" From t = {found.growth_times[better[0]]:g} s on they determine every direction better than the prior."
-        if better.size
-        else ""
-    )
-    noise = "" if found.without_noise is None else "With the process noise assumed, "
+    smallest = float(found.singular_values[-1])
+    how = "to" if smallest > FEEBLE else "only to"
+    better = "" if since is None else f" From t = {since:g} s on they determine every direction better than the prior."
     return [
         f"Observability: the first state is observable from the measurements alone, condition {number(found.condition, 3)}; "
-        f"the weakest direction ({direction}) is known {how} {number(1 / smallest, 2)} prior sigma.{since}",
-        f"{noise or 'N'}{'n' if noise else ''}o unbiased estimator can do better than sigma {', '.join(sigmas)}.",
+        f"the weakest direction ({direction}) is known {how} {number(1 / smallest, 2)} prior sigma.{better}",
+        f"{'With the process noise assumed, n' if noise else 'N'}o unbiased estimator can do better than sigma "
+        f"{', '.join(sigmas)}.",
     ]
 
 
-def _twins(found: Observability) -> list[str]:
-    if not found.twins:
+def twins_found(names: Sequence[str], twins: Sequence[Twin], count: int, *, continuum: bool) -> list[str]:
+    """The twins of states of these names, for so many measurements; a continuum of them where directions are unobservable."""
+    if not twins:
         return ["Twins: none found."]
-    if (found.singular_values == 0).any():
-        return [f"Twins: a continuum of first states gives the same measurements; {len(found.twins)} of them were found."]
+    if continuum:
+        return [f"Twins: a continuum of first states gives the same measurements; {len(twins)} of them were found."]
     out = []
-    count = int((~np.isnan(found.tracking.values)).sum())
-    for twin in found.twins[:_LISTED]:
-        state = ", ".join(f"{name} {number(v, 4)}" for name, v in zip(found.problem.model.names, twin.state, strict=True))
+    for twin in twins[:_LISTED]:
+        state = ", ".join(f"{name} {number(v, 4)}" for name, v in zip(names, twin.state, strict=True))
         exact = twin.misfit < 1e-6
         hidden = twin.misfit * count**0.5 <= _ALIKE
         what = "exactly the same measurements" if exact else "the same measurements to within their noise" if hidden else (
@@ -81,24 +76,24 @@ def _twins(found: Observability) -> list[str]:
         )  # fmt: skip
         place = "" if twin.prior_distance is None else f", {number(twin.prior_distance, 3)} sigma from the prior mean"
         out.append(f"Twin: {state} gives {what}{place}.")
-    if len(found.twins) > _LISTED:
-        out.append(f"And {len(found.twins) - _LISTED} more twins.")
-    far = [twin.prior_distance is not None and twin.prior_distance > _FAR for twin in found.twins]
+    if len(twins) > _LISTED:
+        out.append(f"And {len(twins) - _LISTED} more twins.")
+    far = [twin.prior_distance is not None and twin.prior_distance > _FAR for twin in twins]
     if all(far):
         out.append("Only the prior distinguishes the truth from a twin, and does so clearly.")
     return out
 
 
-def _conclusion(found: Observability) -> list[str]:
-    """What limits the estimators, where the truth is known."""
-    tried = {a.estimator: a for a in found.attempts}
+def conclusion(attempts: Sequence[Attempt], n: int, *, blind: bool) -> list[str]:
+    """What limits the estimators of n values, where the truth is known; `blind` where directions are unobservable."""
+    tried = {a.estimator: a for a in attempts}
     if not {"ekf", "graph"} <= tried.keys():
         return []
     ekf, graph, ideal = tried["ekf"], tried["graph"], tried["ekf at the truth"]
     sizes = f"{_times(ekf.excess)} for the EKF, {_times(graph.excess)} for the factor graph"
     out = [f"Errors of the last half, from the same prior and measurements, in units of the best that is possible: {sizes}."]
     stray = [a.estimator for a in (ekf, graph) if a.twin is not None]
-    attained = float(np.sqrt(quantile(_LUCK, found.problem.model.n) / found.problem.model.n))
+    attained = float(np.sqrt(quantile(_LUCK, n) / n))
     if stray:
         out.append(f"Verdict: a twin; {' and '.join(stray)} ended on its orbit.")
     elif graph.excess <= attained < ekf.excess and ekf.excess > CLEARLY * graph.excess:
@@ -107,7 +102,7 @@ def _conclusion(found: Observability) -> list[str]:
             "Jacobians once, at a wrong state; neither observability nor a twin limits it: "
             f"with Jacobians from the truth the same filter has {_times(ideal.excess)}."
         )
-    elif max(ekf.excess, graph.excess) <= attained and (found.singular_values == 0).any():
+    elif max(ekf.excess, graph.excess) <= attained and blind:
         out.append("Verdict: observability. Both attain the bound; unobservable directions stay as uncertain as in the prior.")
     elif max(ekf.excess, graph.excess) <= attained:
         out.append("Verdict: both attain the bound; nothing is wrong.")

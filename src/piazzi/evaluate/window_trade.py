@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.estimate import FactorGraph, SlidingWindow
-from piazzi.evaluate.bounds import Bounds
-from piazzi.evaluate.comparison import bounds_of, failed
-from piazzi.evaluate.grids import as_text
-from piazzi.evaluate.quantities import ends, finite
-from piazzi.evaluate.rows import Row, evaluate
+from piazzi.evaluate.dataset import numbers
+from piazzi.evaluate.display import PASSED, row_display
+from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
+from piazzi.evaluate.judgement import failing, tested
+from piazzi.evaluate.quantities import duration, ends, finite, ideal, number
+from piazzi.evaluate.rows import Row
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
-from piazzi.problem.inputs import prepare
 
 if TYPE_CHECKING:
     import xarray
     from rich.console import Console, ConsoleOptions, RenderResult
 
 SCHEMA = "piazzi.windows/1"
-LAGS = (1, 2, 5, 10, 20, 50, 100, 200)
-VIEWS = ("realtime", "delayed")
-_SIZES = 12  # lengths of run on which the full graph is timed
-_SHORTEST = 10
-_REPEATS, _LONG = 3, 0.2  # the best of so many timings, of those that take less than so many seconds
+_SAME = 1.0001  # times the best error that is no difference
+_ENOUGH = 1.05  # times the best error that is as good as the best
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +74,12 @@ class WindowTrade:
     @property
     def success(self) -> bool:
         """Whether every window, and the graph, succeeded."""
-        rows = (*self.realtime, *self.delayed, *([self.graph] if self.graph else []))
-        return all(row.success for row in rows)
+        return all(row.success for row in self.all_rows)
+
+    @property
+    def all_rows(self) -> tuple[Row, ...]:
+        """Rows of both views of every window, and that of the graph."""
+        return (*self.realtime, *self.delayed, *([self.graph] if self.graph else []))
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -146,136 +145,137 @@ class WindowTrade:
 
     def to_dataset(self) -> xarray.Dataset:
         """Errors, consistency and cost against lag and view, with units."""
-        from piazzi.evaluate.dataset import windows_to_dataset
+        import xarray as xr
 
-        return windows_to_dataset(self)
+        both = [{k: (v, a) for k, v, a in numbers(self.problem.model, self.rows(view))} for view in ("realtime", "delayed")]
+        variables: dict[str, Any] = {
+            key: (("lag", "view"), np.stack([values, both[1][key][0]], axis=1), attributes)
+            for key, (values, attributes) in both[0].items()
+        }
+        variables["microseconds_per_step"] = (("lag",), self.microseconds_per_step, {"units": "us"})
+        coordinates: dict[str, Any] = {"lag": self.lags, "view": np.array(["realtime", "delayed"], dtype=object)}
+        if self.timing is not None:
+            coordinates["graph_epochs"] = self.timing.epochs
+            variables["graph_seconds"] = (("graph_epochs",), self.timing.seconds, {"units": "s"})
+            variables["graph_iterations"] = (("graph_epochs",), self.timing.iterations)
+        attributes = {"source": self.source, "epochs": len(self.tracking.times), "iterations": self.iterations}
+        return xr.Dataset(variables, coordinates, attributes)
+
+    def grids(self) -> list[Grid]:
+        """Errors, NEES and cost against window length; seconds of the graph against epochs."""
+        out = [_trade(self)]
+        if self.timing is not None:
+            timing = self.timing
+            rows = tuple(
+                (f"{epochs:,}", str(steps) if steps else "-", duration(float(s)), duration(float(s / epochs)))
+                for epochs, s, steps in zip(timing.epochs.tolist(), timing.seconds, timing.iterations.tolist(), strict=True)
+            )
+            out.append(Grid("Full graph, on the first epochs", ("epochs", "iterations", "time", "per epoch"), rows, left=0))
+        return out
+
+    def sentences(self) -> list[str]:
+        """How long a window is long enough, in plain words; what failed."""
+        broken = {r.estimator: r.message for r in self.all_rows if not r.success}
+        out = [f"{name} did not succeed: {message}." for name, message in broken.items()]
+        if not self.groups:
+            return [*out, "There is no truth to compare with, so errors are unknown."]
+        group = self.groups[0]
+        show = row_display(self.problem.model, self.all_rows, group)
+        for view, name in (("realtime", "In real time"), ("delayed", "Delayed")):
+            errors = self.rmse(group, view)
+            if np.isfinite(errors).any():
+                best = float(np.nanmin(errors))
+                lag = _states(int(self.lags[np.flatnonzero(errors <= _SAME * best)[0]]))
+                smallest = f"{number(best * show.factor)}{show.suffix} (RMS), with {lag}"
+                enough = _enough(self.lags, errors, best)
+                out.append(f"{name}, the smallest {group} error of the last half is {smallest}; {enough}.")
+        return out
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        from piazzi.evaluate.window_trade_display import render
-
-        return render(self, console, options)
+        return as_rich(self.grids(), self.sentences(), console, options)
 
     def _repr_html_(self) -> str:
-        from piazzi.evaluate.window_trade_display import html
-
-        return html(self)
+        return as_html(self.grids(), self.sentences())
 
     def __str__(self) -> str:
         return as_text(self)
 
 
-def windows(
-    problem: Problem,
-    tracking: Tracking,
-    lags: Sequence[int] = LAGS,
-    *,
-    iterations: int = 1,
-    graph: bool = True,
-    source: str = "",
-    announce: Callable[[str], None] | None = None,
-) -> WindowTrade:
-    """Run a sliding window of each length, and the full graph on ever longer parts of the tracking.
-
-    Parameters
-    ----------
-    problem : Problem
-    tracking : Tracking
-    lags : numbers of states; each is tried once, in rising order
-    iterations : Gauss-Newton steps of a window at each epoch
-    graph : whether to run and time the full graph too
-    source : where the measurements came from, for the record
-    announce : called with what is about to run
-
-    Raises
-    ------
-    ValueError
-        Where the tracking does not fit the problem, or for a lag that is not a whole number of 1 or more.
-    """
-    prepare(problem, tracking)
-    if not len(lags):
-        raise ValueError("there are no window lengths to try")
-    sizes = {lag: SlidingWindow(lag, iterations) for lag in sorted(set(lags))}
-    say = announce or (lambda _: None)
-    bounds = bounds_of(problem, tracking)
-    pairs = []
-    for lag, window in sizes.items():
-        say(f"window:{lag}")
-        pairs.append(_window(window, problem, tracking, bounds))
-    row, timing = None, None
-    if graph:
-        say("graph")
-        row = _graph(problem, tracking, bounds)
-        timing = graph_timing(problem, tracking, say)
-        row = replace(row, seconds=float(timing.seconds[-1]) if row.success else row.seconds)
-    realtime, delayed = (tuple(pair[i] for pair in pairs) for i in range(2))
-    return WindowTrade(problem, tracking, source, np.array(list(sizes)), iterations, realtime, delayed, row, timing)
+def _enough(lags: Array, errors: Array, best: float) -> str:
+    """From which length on all windows are as good as the best."""
+    worse = np.flatnonzero(~(errors <= _ENOUGH * best))
+    if not worse.size:
+        return "all lengths are within 5 % of it"
+    if worse[-1] + 1 == len(lags):
+        return "longer windows do worse"
+    return f"from {_states(int(lags[worse[-1] + 1]))} on, windows are within 5 % of it"
 
 
-def steps_of(lags: Sequence[int], tracking: Tracking, *, graph: bool = True) -> int:
-    """How often `windows` announces something."""
-    return len(set(lags)) + (1 + len(timed_sizes(len(tracking.times))) if graph else 0)
+def _states(lag: int) -> str:
+    return f"{lag} state{'' if lag == 1 else 's'}"
 
 
-def _window(window: SlidingWindow, problem: Problem, tracking: Tracking, bounds: Bounds | None) -> tuple[Row, Row]:
-    """Real-time and delayed row of one window; one that raises has rows that say why."""
-    name = f"window:{window.lag}" + (f"x{window.iterations}" if window.iterations > 1 else "")
-    try:
-        estimate = window.estimate(problem, tracking)
-        assert estimate.delayed is not None
-        rows = [evaluate(name, e, bounds) for e in (estimate, estimate.delayed)]
-        best = estimate.seconds
-        for _ in range(_REPEATS - 1 if best < _LONG else 0):
-            best = min(best, window.estimate(problem, tracking).seconds)
-    except Exception as error:
-        rows, best = failed(name, window, error), None
-    realtime, delayed = (replace(row, seconds=best) for row in rows)
-    return realtime, delayed
+def _trade(trade: WindowTrade) -> Grid:
+    heads, columns = ["states"], [[str(lag) for lag in trade.lags.tolist()]]
+    for group in trade.groups:
+        show = row_display(trade.problem.model, trade.all_rows, group)
+        for view, name in (("realtime", "real time"), ("delayed", "delayed")):
+            heads.append(f"{group} RMSE\n{name}" + (f"\n[{show.unit}]" if show.unit else ""))
+            columns.append(_texts(trade.rmse(group, view) * show.factor, 4))
+    if trade.groups:
+        for view, name in (("realtime", "real time"), ("delayed", "delayed")):
+            heads.append(f"mean NEES\n{name}\n({ideal(trade.ideal_nees(view))})")
+            columns.append(_texts(trade.mean_nees(view), 3))
+    heads += ["mean NIS", "per step"]
+    columns.append(["-" if r.mean_nis is None else number(r.mean_nis, 3) for r in trade.realtime])
+    columns.append([duration(float(us) * 1e-6) for us in trade.microseconds_per_step])
+    if any(map(tested, trade.realtime)):
+        heads.append("tests failed\nreal time\n(5 % each)")
+        columns.append([", ".join(failing(r)) or PASSED if tested(r) else "-" for r in trade.realtime])
+    remarks = ["FAILED" if not r.success else "diverged" if r.diverged else "" for r in trade.realtime]
+    if any(remarks):
+        heads.append("")
+        columns.append(remarks)
+    cells = [tuple(row) for row in zip(*columns, strict=True)]
+    if trade.graph is not None:
+        cells.append(_graph(trade, len(heads)))
+    if any(row.crlb for row in trade.realtime):
+        cells.append(_bound(trade, len(heads)))
+    spare = _columns(heads, "tests", "mean NEES\ndelayed", *(f"{g} " for g in trade.groups[1:]), "mean NIS", "mean NEES")
+    return Grid("Sliding windows, last half of the run", tuple(heads), tuple(cells), 0, spare)
 
 
-def _graph(problem: Problem, tracking: Tracking, bounds: Bounds | None) -> Row:
-    try:
-        return evaluate("graph", FactorGraph().estimate(problem, tracking), bounds)
-    except Exception as error:
-        return failed("graph", FactorGraph(), error)[0]
+def _columns(heads: list[str], *starts: str) -> tuple[int, ...]:
+    """Columns whose headings start so, in the order of the starts."""
+    return tuple(dict.fromkeys(i for start in starts for i, head in enumerate(heads) if head.startswith(start)))
 
 
-def timed_sizes(K: int) -> list[int]:
-    """Numbers of epochs to time the graph on, from a few to all, evenly on a logarithmic scale."""
-    if K <= _SHORTEST:
-        return [K]
-    return sorted({round(k) for k in np.geomspace(_SHORTEST, K, _SIZES).tolist()})
+def _graph(trade: WindowTrade, width: int) -> tuple[str, ...]:
+    """The line of the full graph: it has no real-time view."""
+    assert trade.graph is not None
+    row, cells = trade.graph, ["all (graph)"]
+    for group in trade.groups:
+        value = row.rmse_last_half.get(group)
+        show = row_display(trade.problem.model, trade.all_rows, group)
+        cells += ["-", number(None if value is None else value * show.factor)]
+    if trade.groups:
+        cells += ["-", number(row.mean_nees_last_half, 3)]
+    per_step = None if row.seconds is None else row.seconds / len(trade.tracking.times)
+    cells += [number(row.mean_nis, 3), duration(per_step)]
+    cells += [""] * (width - len(cells))
+    return (*cells[:-1], "FAILED") if not row.success else tuple(cells)
 
 
-def graph_timing(problem: Problem, tracking: Tracking, announce: Callable[[str], None] = lambda _: None) -> Timing:
-    """Seconds of the full graph on the first 10 ... K epochs: the best of three runs where they are short."""
-    sizes = timed_sizes(len(tracking.times))
-    seconds, steps = [], []
-    for size in sizes:
-        announce(f"graph of {size} epochs")
-        best, count = _timed(problem, head(tracking, size))
-        seconds.append(best)
-        steps.append(count)
-    return Timing(np.array(sizes), np.array(seconds), np.array(steps))
+def _bound(trade: WindowTrade, width: int) -> tuple[str, ...]:
+    """The line of the Cramer-Rao bound."""
+    cells = ["bound"]
+    for group in trade.groups:
+        show = row_display(trade.problem.model, trade.all_rows, group)
+        for view in ("realtime", "delayed"):
+            value = trade.crlb(group, view)
+            cells.append(number(None if value is None else value * show.factor))
+    return (*cells, *("-" for _ in range(width - len(cells))))
 
 
-def _timed(problem: Problem, tracking: Tracking) -> tuple[float, int]:
-    best, count = np.inf, 0
-    for _ in range(_REPEATS):
-        try:
-            estimate = FactorGraph().estimate(problem, tracking)
-        except ValueError:
-            return np.nan, 0
-        if not estimate.success:
-            return np.nan, int(estimate.iterations)
-        best, count = min(best, estimate.seconds), int(estimate.iterations)
-        if estimate.seconds > _LONG:
-            break
-    return best, count
-
-
-def head(tracking: Tracking, epochs: int) -> Tracking:
-    """The first so many epochs of a tracking."""
-    rows = int(tracking.first_row[epochs])
-    stations = None if tracking.row_stations is None else tracking.row_stations[:rows]
-    truth = None if tracking.truth is None else tracking.truth[:epochs]
-    return Tracking(tracking.row_times[:rows], tracking.values[:rows], stations, truth, tracking.epoch)
+def _texts(values: Array, digits: int) -> list[str]:
+    return [number(float(v), digits) if np.isfinite(v) else "-" for v in values]

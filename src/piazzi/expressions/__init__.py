@@ -10,9 +10,9 @@ from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from piazzi.expressions.bounds import read
+from piazzi.expressions.bounds import added, read
 from piazzi.expressions.errors import ExpressionError, quote
-from piazzi.expressions.functions import arities
+from piazzi.expressions.functions import Function, arities
 from piazzi.expressions.language import CONSTANTS
 from piazzi.expressions.numeric import evaluate, evaluate_arrays
 from piazzi.expressions.parse import Equation, is_name
@@ -29,6 +29,8 @@ __all__ = [
     "FUNCTIONS",
     "Equation",
     "ExpressionError",
+    "Function",
+    "added",
     "check",
     "evaluate",
     "evaluate_arrays",

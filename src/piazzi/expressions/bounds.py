@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, TypeAlias
 
 from piazzi.expressions.errors import ExpressionError
-from piazzi.expressions.functions import TABLE
+from piazzi.expressions.functions import TABLE, Function
 from piazzi.expressions.language import CONSTANTS, MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum, fold
 from piazzi.expressions.parse import Equation, parse
 
@@ -61,9 +62,17 @@ def read(text: str) -> Equation:
     return _read(text) if isinstance(hashable, str) else parse(text)  # which refuses what is no text
 
 
-def forget() -> None:
-    """Forget what was read: the language has changed."""
-    _read.cache_clear()
+@contextmanager
+def added(function: Function) -> Iterator[None]:
+    """Within the block, the language has one function more: to try it before it joins the table."""
+    if function.name in TABLE:
+        raise ValueError(f"the language has a function {function.name!r} already")
+    TABLE[function.name] = function
+    try:
+        yield
+    finally:
+        del TABLE[function.name]
+        _read.cache_clear()
 
 
 @lru_cache(maxsize=REMEMBERED)

@@ -8,10 +8,8 @@ SymPy and NumPy are looked up by name when they are wanted: reading and checking
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, Literal
 
 Growth = Literal["same", "magnitude", "root", "doubled", "logarithm", "exponential"]
@@ -58,17 +56,6 @@ class Function:
     exact: bool = False
     variadic: bool = False
     derived: bool = False
-
-    @property
-    def symbolic(self) -> Any:
-        """SymPy's class of it, None where SymPy has none."""
-        import sympy as sp
-
-        return _class_of(self) if self.partials else getattr(sp, self.sympy) if self.sympy else None
-
-    def on_sympy(self, *arguments: Any) -> Any:
-        """The SymPy expression of a call."""
-        return (self.build or self.symbolic)(*arguments)
 
     @property
     def on_arrays(self) -> Callable[..., Any]:
@@ -157,45 +144,14 @@ def arities() -> dict[str, int]:
     return {f.name: f.arity for f in TABLE.values() if not f.derived}
 
 
-@contextmanager
-def added(function: Function) -> Iterator[None]:
-    """Within the block, the language has one function more: to try it before it joins the table."""
-    if function.name in TABLE:
-        raise ValueError(f"the language has a function {function.name!r} already")
-    from piazzi.expressions.bounds import forget
-
-    TABLE[function.name] = function
-    try:
-        yield
-    finally:
-        del TABLE[function.name]
-        forget()
-
-
 def of_sympy(expr: Any) -> Function | None:
     """The function that a SymPy call is of, None where the language has none."""
-    kind = type(expr).__name__
-    for function in TABLE.values():
-        if kind == (function.sympy or function.name) and function.symbolic is expr.func:
-            return function
-    return None
-
-
-@cache
-def _class_of(function: Function) -> Any:
-    """A SymPy function that is real, differentiates by its partials, and has a value where its arguments do."""
     import sympy as sp
 
-    from piazzi.expressions import symbol, to_sympy
-
-    symbols = {name: symbol(name) for name in "abcdefgh"[: function.arity]}
-
-    def fdiff(self: Any, argindex: int = 1) -> Any:
-        partial = to_sympy(function.partials[argindex - 1], symbols)
-        return partial.xreplace(dict(zip(symbols.values(), self.args, strict=True)))
-
-    def evalf(self: Any, precision: int) -> Any:
-        return sp.Float(function.value(*map(float, self.args)))
-
-    body = {"nargs": function.arity, "fdiff": fdiff, "_eval_evalf": evalf, "_eval_is_extended_real": lambda self: True}
-    return type(function.name, (sp.Function,), body)
+    kind = type(expr).__name__
+    for function in TABLE.values():
+        if kind != (function.sympy or function.name):
+            continue
+        if getattr(expr.func, "row", None) == function if function.partials else getattr(sp, kind, None) is expr.func:
+            return function
+    return None

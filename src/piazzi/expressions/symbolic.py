@@ -7,9 +7,9 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from piazzi.expressions.bounds import MAX_EXPONENT
+from piazzi.expressions.bounds import MAX_EXPONENT, read
 from piazzi.expressions.errors import ExpressionError
-from piazzi.expressions.functions import TABLE
+from piazzi.expressions.functions import TABLE, Function
 from piazzi.expressions.language import MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum, fold
 from piazzi.expressions.parse import Equation
 
@@ -73,7 +73,35 @@ def _build_unchecked(node: Node, parts: list[Any], text: str, symbols: Mapping[s
         case Power():
             return _power(parts[0], parts[1], node, text)
         case Call(function=function):
-            return TABLE[function].on_sympy(*parts)
+            return _maker(TABLE[function])(*parts)
+
+
+def _maker(function: Function) -> Any:
+    """What makes SymPy's expression of a call: a function of its arguments, or a class."""
+    import sympy as sp
+
+    return function.build or (_class_of(function) if function.partials else getattr(sp, function.sympy))
+
+
+@functools.cache
+def _class_of(function: Function) -> Any:
+    """A SymPy function that is real, differentiates by its partials, and has a value where its arguments do."""
+    import sympy as sp
+
+    symbols = {name: symbol(name) for name in "abcdefgh"[: function.arity]}
+
+    def fdiff(self: Any, argindex: int = 1) -> Any:
+        partial = build(read(function.partials[argindex - 1]), symbols)
+        return partial.xreplace(dict(zip(symbols.values(), self.args, strict=True)))
+
+    body = {
+        "row": function,
+        "nargs": function.arity,
+        "fdiff": fdiff,
+        "_eval_evalf": lambda self, precision: sp.Float(function.value(*map(float, self.args))),
+        "_eval_is_extended_real": lambda self: True,
+    }
+    return type(function.name, (sp.Function,), body)
 
 
 def _product(factors: list[tuple[bool, Any, int]], text: str) -> Any:

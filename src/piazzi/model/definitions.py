@@ -72,11 +72,6 @@ def with_values(values: Mapping[str, float], *layers: Definitions) -> dict[str, 
     return out
 
 
-def renamed_in(definitions: Definitions, rename: Any) -> Definitions:
-    """The same definitions with `rename` applied to every equation."""
-    return tuple((name, rename(text)) for name, text in definitions)
-
-
 def unused(definitions: Definitions, users: Sequence[str]) -> list[str]:
     """Names of definitions that no equation needs."""
     found = needed(users, definitions)

@@ -5,16 +5,39 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from piazzi.expressions import symbol, to_sympy
 from piazzi.expressions.patience import TooSlowError, patiently
 from piazzi.model.definitions import Definitions, needed
-from piazzi.model.model import STEP, TIME, Model
-from piazzi.model.sensor import Sensor
+from piazzi.model.naming import STEP, TIME
+from piazzi.model.sensor import Parameter, Sensor
 
 if TYPE_CHECKING:
     import sympy as sp
+
+
+class Equations(Protocol):
+    """What is derived of a `Model`, and shown."""
+
+    def __hash__(self) -> int: ...
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def given(self) -> tuple[str, ...]: ...
+    @property
+    def dynamics(self) -> tuple[str, ...]: ...
+    @property
+    def memory(self) -> Any: ...
+    @property
+    def definitions(self) -> Any: ...
+    @property
+    def discrete(self) -> bool: ...
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
+    @property
+    def sensors(self) -> tuple[Sensor, ...]: ...
+    def numbers(self, sensor: Sensor) -> tuple[str, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -101,7 +124,7 @@ class _Chain:
 
 
 @lru_cache(maxsize=64)
-def derive(model: Model) -> Derivation:
+def derive(model: Equations) -> Derivation:
     """Dynamics and their Jacobian; raises ExpressionError for an equation outside the language."""
     import sympy as sp
 
@@ -117,7 +140,7 @@ def derive(model: Model) -> Derivation:
 
 
 @lru_cache(maxsize=256)
-def derive_sensor(model: Model, sensor: Sensor) -> SensorDerivation:
+def derive_sensor(model: Equations, sensor: Sensor) -> SensorDerivation:
     """What a sensor sees and its derivatives."""
     import sympy as sp
 
@@ -165,7 +188,7 @@ def jacobian(f: sp.Matrix, x: Sequence[sp.Symbol]) -> sp.Matrix:
     return sp.Matrix(f.rows, len(x), entries)
 
 
-def constant_acceleration_step(model: Model) -> tuple[tuple[sp.Expr, ...], sp.Symbol]:
+def constant_acceleration_step(model: Equations) -> tuple[tuple[sp.Expr, ...], sp.Symbol]:
     """One step of constant acceleration, as in the founding text, and the symbol of its length.
 
     A state whose rate is itself a state (a position) is taken to second order, x + h v + h^2/2 dv/dt; every other to first

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from piazzi.model.derivation import Stage, derive, derive_sensor
-
-if TYPE_CHECKING:
-    from piazzi.model.model import Model
+from piazzi.model.derivation import Equations, Stage, derive, derive_sensor
 
 
-def sections(model: Model) -> list[tuple[str, Any]]:
+def sections(model: Equations) -> list[tuple[str, Any]]:
     """Titles and SymPy objects: state, parameters, dynamics and F, and h and H of every sensor."""
     import sympy as sp
 
@@ -19,7 +16,7 @@ def sections(model: Model) -> list[tuple[str, Any]]:
     name_of_f = "x[k+1]" if model.discrete else "dx/dt = f"
     out: list[tuple[str, Any]] = [("state x", sp.Matrix(d.x))]
     if model.parameters:
-        out.append(("parameters p", sp.Matrix([sp.Symbol(p) for p in model.parameter_names])))
+        out.append(("parameters p", sp.Matrix([sp.Symbol(p.name) for p in model.parameters])))
     out += _shown(d.partials)
     out += [(name_of_f, d.f), ("Phi = dx[k+1]/dx" if model.discrete else "F = df/dx", d.F)]
     for sensor in model.sensors:
@@ -41,7 +38,7 @@ def _shown(stages: Sequence[Stage], what: str = "") -> list[tuple[str, Any]]:
     return [(f"definitions and their derivatives{what}", sp.Matrix(rows))]
 
 
-def latex(model: Model) -> str:
+def latex(model: Equations) -> str:
     """The sections as one LaTeX display."""
     import sympy as sp
 
@@ -49,7 +46,7 @@ def latex(model: Model) -> str:
     return r"$$\begin{aligned}" + r"\\[4pt] ".join(rows) + r"\end{aligned}$$"
 
 
-def rich_text(model: Model) -> Any:
+def rich_text(model: Equations) -> Any:
     """The sections as a rich group of titled, two-dimensional formulas."""
     import sympy as sp
     from rich.console import Group
@@ -63,7 +60,7 @@ def rich_text(model: Model) -> Any:
     return Group(*parts)
 
 
-def show(model: Model) -> None:
+def show(model: Equations) -> None:
     """Display the model where the caller is: LaTeX in a notebook, rich text in a terminal."""
     try:
         from IPython import get_ipython  # type: ignore[import-not-found,unused-ignore]

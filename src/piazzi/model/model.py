@@ -9,12 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from piazzi.expressions import names
 from piazzi.model.definitions import definitions_of, needed, unused
-from piazzi.model.naming import name_of, text_of
+from piazzi.model.naming import STEP, TIME, name_of, text_of
 from piazzi.model.sensor import Parameter, Sensor, several
 from piazzi.text import nearest
-
-TIME = "t"
-STEP = "dt"
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,9 @@ from typing import Any
 
 from piazzi.expressions import from_sympy, is_name, names
 
+TIME = "t"
+STEP = "dt"
+
 
 def text_of(equation: Any) -> str:
     """Canonical text of an equation given as text, number or SymPy expression; raises `ExpressionError`."""

@@ -1,18 +1,19 @@
-"""A problem whose accelerations wander: its model with Gauss-Markov states, and the numbers of these."""
+"""Accelerations that nobody modelled: first-order Gauss-Markov processes as further states of a problem."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from piazzi import model as equations
-from piazzi.model.gauss_markov import driven_states
+from piazzi.model import Model, Parameter
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.parts import Gaussian, ProcessNoise, Truth
 from piazzi.problem.problem import Problem
+from piazzi.text import nearest
 
 
 def with_gauss_markov(
@@ -25,6 +26,8 @@ def with_gauss_markov(
 ) -> Problem:
     """The problem with a stationary first-order Gauss-Markov process added to the rate of each of `states`.
 
+    A process is a further state of the model: da/dt = -a / tau, plus white noise.
+
     Parameters
     ----------
     problem : Problem
@@ -35,10 +38,10 @@ def with_gauss_markov(
     time_constant : float
         Seconds after which a disturbance has decayed to 1/e.
     states : name of a group, or names of states
+        The new states are called by them, with the prefix, and form the group "gauss_markov".
     parameter : str
         Name that the time constant gets in the model.
     prefix : str
-        Of the new states' names.
 
     Returns
     -------
@@ -49,10 +52,10 @@ def with_gauss_markov(
     Raises
     ------
     ValueError
-        For process noise per step, or values that are not positive.
+        For a discrete model, unknown states, process noise per step, or values that are not positive.
     """
-    model = equations.with_gauss_markov(problem.model, states, parameter, prefix)
-    driven = driven_states(problem.model, states)
+    driven = _driven(problem.model, states)
+    model = _extended(problem.model, driven, parameter, prefix)
     spread = np.broadcast_to(numeric(sigma, "sigma"), (len(driven),))
     if not (np.isfinite(spread) & (spread > 0)).all() or not 0 < time_constant < np.inf:
         raise ValueError(f"sigma is {sigma} and time_constant {time_constant}; both must be positive")
@@ -74,7 +77,47 @@ def with_gauss_markov(
     )
 
 
-def _continued(problem: Problem, covariance: Array, model: equations.Model, variances: Array) -> Array:
+def _driven(model: Model, states: str | Sequence[str]) -> tuple[str, ...]:
+    """States of a group of the model, or those named; raises ValueError for an unknown one."""
+    if model.discrete:
+        raise ValueError("the model is a step, x[k+1]: a Gauss-Markov process needs rates")
+    groups = dict(model.groups)
+    if isinstance(states, str):
+        if states not in groups:
+            raise ValueError(f"{states!r} is not a group of the model{nearest(states, groups)}")
+        return tuple(groups[states])
+    for name in states:
+        if name not in model.states:
+            raise ValueError(f"{name!r} is not a state{nearest(name, model.states)}")
+    return tuple(states)
+
+
+def _extended(model: Model, driven: Sequence[str], tau: str, prefix: str) -> Model:
+    """The model with one more state for each driven one, added to its rate."""
+    new = tuple(prefix + s for s in driven)
+    rates = dict(zip(model.states, model.dynamics, strict=True))
+    rates |= {s: f"{rates[s]} + {a}" for s, a in zip(driven, new, strict=True)}
+    rates |= {a: f"-{a}/{tau}" for a in new}
+    added = tau not in (*model.parameter_names, *model.states)
+    units = {a: _per_second(model.unit(s)) for s, a in zip(driven, new, strict=True) if model.unit(s)}
+    return replace(
+        model,
+        states=(*model.states, *new),
+        dynamics=tuple(rates.values()),
+        parameters=(*model.parameters, Parameter(tau, unit="s")) if added else model.parameters,
+        groups={**dict(model.groups), "gauss_markov": new},
+        units={**dict(model.units), **units},
+        memory=dict(model.memory),
+    )
+
+
+def _per_second(unit: str) -> str:
+    """The unit of a rate: "m/s^2" of "m/s"."""
+    match = re.fullmatch(r"(.+)/s(?:\^(\d+))?", unit)
+    return f"{match[1]}/s^{int(match[2] or 1) + 1}" if match else f"{unit}/s"
+
+
+def _continued(problem: Problem, covariance: Array, model: Model, variances: Array) -> Array:
     """A covariance of the old values with these variances of the new ones, by name, (n, n)."""
     out = np.zeros((model.n, model.n))
     old = [model.names.index(name) for name in problem.model.names]
@@ -84,7 +127,7 @@ def _continued(problem: Problem, covariance: Array, model: equations.Model, vari
     return out
 
 
-def _calm(problem: Problem, truth: Truth, model: equations.Model, count: int) -> Truth:
+def _calm(problem: Problem, truth: Truth, model: Model, count: int) -> Truth:
     """The truth, undisturbed by the new states."""
     state = None if truth.state is None else [*numeric(truth.state, "true state").reshape(-1), *np.zeros(count)]
     noise = truth.process_noise

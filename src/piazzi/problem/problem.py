@@ -82,7 +82,7 @@ class Problem:
         self._check_regular()
         self._lay_out()
         if isinstance(self.integrator, Kepler):
-            check_two_body(self, self.integrator)
+            check_two_body(self.model, self.integrator, self._values())
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the specifications of kernels, which this process shares among problems."""
@@ -168,9 +168,13 @@ class Problem:
 
     def _check_regular(self) -> None:
         """Refuse a prior mean at which an equation has no value, such as the centre of attraction."""
-        where = functions.singular_equation(self)
+        where = functions.singular_equation(self.model, self.stations, self._values(), self.prior_time or 0.0)
         if where:
             raise ValueError(where)
+
+    def _values(self) -> dict[str, float]:
+        """Values of states and parameters at the prior mean, by name."""
+        return dict(zip(self.model.names, self.mean, strict=True)) | dict(zip(self.model.given, self.given, strict=False))
 
     # ---- what kernels are given ----------------------------------------------------------------------------------
 
@@ -270,7 +274,15 @@ class Problem:
         key = (fragments, lanes)
         spec = self.specs.get(key)
         if spec is None:
-            spec = self.specs[key] = KernelSpec(self.model, self.integrator.scheme, composed(self, fragments, lanes), lanes)
+            parts = composed(
+                fragments,
+                self.integrator,
+                manoeuvres=bool(self.manoeuvres),
+                axes=self.process_noise.axes,
+                noise_varies=self.noise_varies,
+                in_lanes=self.moves_in_lanes and lanes > 1,
+            )
+            spec = self.specs[key] = KernelSpec(self.model, self.integrator.scheme, parts, lanes)
         return spec
 
     @cached_property
@@ -337,23 +349,30 @@ class Problem:
 
     def dynamics(self, x: Any, t: Any = 0.0) -> Array:
         """dx/dt at one state (n,) or many (K, n), same shape."""
-        return functions.dynamics(self, x, t)
+        return functions.rates(self.spec("transition", "rates"), "evaluate_dynamics", self.given, x, t)
 
     def dynamics_jacobian(self, x: Any, t: Any = 0.0) -> Array:
         """F = df/dx at one state (n, n) or many (K, n, n)."""
-        return functions.dynamics_jacobian(self, x, t)
+        return functions.rates(self.spec("transition", "rates"), "evaluate_dynamics_jacobian", self.given, x, t)
 
     def step(self, x: Any, dt: float, t: Any = 0.0) -> tuple[Array, Array]:
         """The state `dt` seconds later and the derivative of that step, shapes (n,), (n, n) or (K, n), (K, n, n)."""
-        return functions.step(self, x, dt, t)
+        assert self.integrator is not None
+        return functions.step(self.spec("transition", "functions"), self.integrator, self.given, x, dt, t)
 
     def measure(self, station: str, x: Any, t: Any = 0.0) -> Array:
         """Noiseless measurement h of a station, (m,) or (K, m)."""
-        return functions.measure(self, station, x, t)
+        return functions.measure(*self._measured(station), self.given, x, t)
 
     def measurement_jacobian(self, station: str, x: Any, t: Any = 0.0) -> Array:
         """H = dh/dx of a station, (m, n) or (K, m, n)."""
-        return functions.measurement_jacobian(self, station, x, t)
+        return functions.measurement_jacobian(*self._measured(station), self.given, x, t)
+
+    def _measured(self, station: str) -> tuple[KernelSpec, int, Array, int]:
+        """Compiled module, index of the sensor, own numbers and number of components of a station."""
+        s = self.station_index(station)
+        spec = self.spec("transition", "functions")
+        return spec, int(self.station_sensor[s]), self.station_numbers[s], len(self.stations[s].noise)
 
     def station_index(self, name: str) -> int:
         """Position of a station; raises ValueError with the nearest name."""

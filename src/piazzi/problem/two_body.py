@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from math import hypot, isclose
-from typing import TYPE_CHECKING
 
 from piazzi.expressions import evaluate
 from piazzi.kernels import Kepler
 from piazzi.model import Model
 from piazzi.model.definitions import with_values
 from piazzi.text import nearest
-
-if TYPE_CHECKING:
-    from piazzi.problem.problem import Problem
 
 # where equations are compared, in units of the prior's distance: near and far, so that forces of any reach show
 _SCALES = (1.0, 0.3, 30.0)
@@ -31,10 +28,8 @@ def check_orbit_axes(model: Model) -> None:
         )
 
 
-def check_two_body(problem: Problem, kepler: Kepler) -> None:
-    """Raise ValueError unless the problem's dynamics are Kepler's motion."""
-    model = problem.model
-    numbers = dict(zip(model.names, problem.mean, strict=True)) | dict(zip(model.given, problem.given, strict=False))
+def check_two_body(model: Model, kepler: Kepler, numbers: Mapping[str, float]) -> None:
+    """Raise ValueError unless the dynamics are Kepler's motion; `numbers` has values of states and parameters."""
     position, _ = kepler.axes(dict(model.groups))
     distance = hypot(*(numbers.get(s, 1.0) for s in position))
     where = departure(model, kepler, tuple((name, float(value)) for name, value in numbers.items()), distance)

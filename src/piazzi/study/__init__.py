@@ -1,8 +1,7 @@
 """Studies: many runs of many settings, on one machine or a cluster, and nothing lost."""
 
-from piazzi.study.execute import kept_runs, run_study
-from piazzi.study.plan import Study
-from piazzi.study.store import Stored, read_store, same_results
-from piazzi.study.summary import Line, Summary
+from piazzi.study.execute import Study, kept_runs, run_study
+from piazzi.study.store import Stored, Summary, read_store, same_results
+from piazzi.study.summary import Line
 
 __all__ = ["Line", "Stored", "Study", "Summary", "kept_runs", "read_store", "run_study", "same_results"]

@@ -10,7 +10,7 @@ from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.simulation import true_problem
 from piazzi.study.lanes import Layout, compiles, filter_runs
-from piazzi.study.plan import BOUND_RUNS, Study
+from piazzi.study.plan import BOUND_RUNS, Plan
 from piazzi.study.runs import Runs, simulated
 from piazzi.study.tasks import Task
 
@@ -18,7 +18,7 @@ VIEWS = "realtime", "delayed"
 SLOW_RUNS = 64  # truths where each takes a filter and a smoother of its own
 
 
-def bound_at(study: Study, point: int) -> dict[str, Array]:
+def bound_at(study: Plan, point: int) -> dict[str, Array]:
     """Bound on the variance of each group of states, averaged over truths, NaN where there is none.
 
     Linearised at each truth, with the numbers of the problem as it is (Tichavsky, Muravchik and Nehorai, IEEE Trans. Signal
@@ -46,12 +46,12 @@ def bound_at(study: Study, point: int) -> dict[str, Array]:
     return _arrays(study, np.stack([mean.variance for mean in means]), np.array([mean.runs for mean in means]))
 
 
-def no_bound(study: Study) -> dict[str, Array]:
+def no_bound(study: Plan) -> dict[str, Array]:
     """The same where it is not known."""
     return _arrays(study, np.full((2, len(study.times), len(study.groups)), np.nan), np.zeros(2))
 
 
-def _arrays(study: Study, variance: Array, count: Array) -> dict[str, Array]:
+def _arrays(study: Plan, variance: Array, count: Array) -> dict[str, Array]:
     half = variance[:, variance.shape[1] // 2 :]
     return {
         "bound": np.sqrt(variance[:, study.kept]).astype(np.float32),
@@ -78,7 +78,7 @@ class _Mean:
         return self.total / self.known if self.known else np.full_like(self.total, np.nan)
 
 
-def _add(mean: _Mean, first: int, study: Study, actual: Problem, runs: Runs, good: list[int], view: str) -> int:
+def _add(mean: _Mean, first: int, study: Plan, actual: Problem, runs: Runs, good: list[int], view: str) -> int:
     """Add the bounds of truths to a mean; of how many: all in lanes, `SLOW_RUNS` in all one by one."""
     layout = Layout(actual, study.times)
     sample = runs.z[good[:1]], runs.truth[good[:1]]
@@ -97,7 +97,7 @@ def _add(mean: _Mean, first: int, study: Study, actual: Problem, runs: Runs, goo
     return len(good)
 
 
-def _one_by_one(study: Study, actual: Problem, trackings: list[Tracking], view: str) -> Array:
+def _one_by_one(study: Plan, actual: Problem, trackings: list[Tracking], view: str) -> Array:
     """Variance of each group (N, K, G), of the truths that have a bound."""
     from piazzi.evaluate.bounds import posterior_bounds
 

@@ -16,7 +16,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from piazzi.study.pieces import run_task
-from piazzi.study.plan import Study
+from piazzi.study.plan import Plan
 from piazzi.study.pool import ENVIRONMENT, Outcome, processors
 from piazzi.study.tasks import Piece, Task
 from piazzi.study.versions import difference_of, fingerprint
@@ -38,7 +38,7 @@ class Cluster:
 
     Parameters
     ----------
-    study : Study
+    study : Plan
     address : of a scheduler, ``tcp://host:8786``, or "local"
     workers : processes of a local cluster
     silence : seconds after which a scheduler that answers nothing is given up
@@ -51,7 +51,7 @@ class Cluster:
         Where Dask is not installed, the address makes no sense, or workers have other versions than this process.
     """
 
-    def __init__(self, study: Study, address: str, workers: int | None, silence: float = SILENCE_SECONDS) -> None:
+    def __init__(self, study: Plan, address: str, workers: int | None, silence: float = SILENCE_SECONDS) -> None:
         try:
             import distributed  # noqa: F401
         except ImportError:
@@ -258,9 +258,9 @@ def _check_versions(client: Client, address: str, here: dict[str, str], silence:
 
 
 @lru_cache(maxsize=4)
-def _unpickled(study: bytes) -> Study:
+def _unpickled(study: bytes) -> Plan:
     found = pickle.loads(study)
-    assert isinstance(found, Study)
+    assert isinstance(found, Plan)
     return found
 
 

@@ -10,17 +10,61 @@ from pathlib import Path
 from typing import Any
 
 from piazzi.io.atomic import check_writable
+from piazzi.scenarios import load_scenario
 from piazzi.study.log import ENDING, Log
-from piazzi.study.plan import Study
+from piazzi.study.plan import Plan
 from piazzi.study.pool import Here, Processes, Workers, processors
 from piazzi.study.runner import Progress, Runner
-from piazzi.study.store import Stored, read_store, write_store
+from piazzi.study.store import Stored, read_store
+from piazzi.study.storing import write_store
 from piazzi.study.tasks import Task
 from piazzi.study.versions import difference_of, fingerprint
 
 
+class Study(Plan):
+    """Simulate, estimate and score `runs` seeds at every point of a grid.
+
+    Parameters
+    ----------
+    problem : Problem, with its truth half
+    times : (K,) seconds, strictly increasing
+    estimators : names as on the command line, or a mapping of the name to show to such a name or an estimator
+    runs : int
+    seed : int
+        Of everything.  Draws of prior, process and measurement noise of a run are children of it by the run's number: a run is
+        the same whatever else is run, and at every point of the grid.
+    vary : mapping of name to values
+        Settings of estimators (``lag``, ``iterations``, ``gate``, ...), each for those that have it; ``R.scale``,
+        ``R.STATION.scale``, ``Q.scale``, ``P.scale``, ``substeps`` and parameters by name, for the problem.  A number of the
+        problem changes what estimators believe and what happens; with ``assumed.`` or ``truth.`` before it, one of the two.
+    name : str, for the record
+
+    Raises
+    ------
+    ValueError
+        For unknown names (with the nearest), values that do not fit, or a grid beyond reason.
+    """
+
+    @classmethod
+    def of(cls, scenario: str | os.PathLike[str], **changes: Any) -> Study:
+        """The study of a scenario, by name or path: as its section [study] says, with these changes."""
+        found = load_scenario(scenario)
+        plan = found.study
+        given: dict[str, Any] = {
+            "estimators": plan.estimators or ("ekf",),
+            "runs": plan.runs or 100,
+            "vary": plan.vary,
+            "name": found.name,
+        } | changes
+        return cls(found.problem, found.times, **given)
+
+    def run(self, path: str | os.PathLike[str], **options: Any) -> Stored:
+        """Run into a NetCDF file; see `piazzi.study.execute.run_study` for the options."""
+        return run_study(self, path, **options)
+
+
 def run_study(
-    study: Study,
+    study: Plan,
     path: str | os.PathLike[str],
     *,
     resume: bool = False,
@@ -93,7 +137,7 @@ def kept_runs(path: str | os.PathLike[str]) -> int:
     return sum(entry.task.count for entry in log.entries)
 
 
-def _finished(study: Study, store: Path, resume: bool) -> Stored | None:
+def _finished(study: Plan, store: Path, resume: bool) -> Stored | None:
     """The store, where it is there and of this study."""
     if not store.exists():
         return None
@@ -106,7 +150,7 @@ def _finished(study: Study, store: Path, resume: bool) -> Stored | None:
     return found
 
 
-def _log(study: Study, path: Path, resume: bool) -> Log:
+def _log(study: Plan, path: Path, resume: bool) -> Log:
     if not path.exists():
         return Log.create(path, study.specification | {"versions": fingerprint()})
     if not resume:
@@ -125,7 +169,7 @@ def _log(study: Study, path: Path, resume: bool) -> Log:
     return log
 
 
-def _belongs(study: Study, task: Task) -> bool:
+def _belongs(study: Plan, task: Task) -> bool:
     """Whether a task is one of the study's: whatever is in a log, this is what the runs that are missing are counted by."""
     numbers = (task.point, task.first, task.count)
     whole = all(type(i) is int and i >= 0 for i in numbers)
@@ -144,7 +188,7 @@ def _difference(there: Any, here: Mapping[str, Any]) -> str:
     return ""
 
 
-def _team(study: Study, workers: int | None, scheduler: str | None) -> Workers:
+def _team(study: Plan, workers: int | None, scheduler: str | None) -> Workers:
     if scheduler is not None:
         from piazzi.study.cluster import Cluster
 

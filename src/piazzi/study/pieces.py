@@ -14,30 +14,28 @@ from piazzi.estimate.width import DIFFUSE, prior_ratio
 from piazzi.problem import Problem
 from piazzi.study.bound import bound_at, no_bound
 from piazzi.study.lanes import compiles, filter_runs
-from piazzi.study.plan import Study
+from piazzi.study.plan import Plan
 from piazzi.study.runs import Runs, simulated
 from piazzi.study.score import NUMBERS, Scored, nothing, score_estimate, score_lanes
-from piazzi.study.tasks import Piece, Task
+from piazzi.study.tasks import Piece, Task, joined
 
 LOGGER = logging.getLogger("piazzi.study")
 _DOUBTFUL = 1e-9  # smallest pivot of a correlation matrix down to which elimination in lanes is as good as any
 
 
-def run_task(study: Study, task: Task) -> Piece:
+def run_task(study: Plan, task: Task) -> Piece:
     """The results of a task."""
     if not task.count:
         return Piece(task, bound_at(study, task.point))
-    parts = [
-        _run(study, Task(task.point, first, min(study.largest_piece, task.first + task.count - first)))
-        for first in range(task.first, task.first + task.count, study.largest_piece)
-    ]
-    if len(parts) == 1:
-        return parts[0]
-    arrays = {name: np.concatenate([p.arrays[name] for p in parts], axis=1) for name in parts[0].arrays}
-    return Piece(task, arrays, tuple(m for p in parts for m in p.messages))
+    return joined(
+        [
+            _run(study, Task(task.point, first, min(study.largest_piece, task.first + task.count - first)))
+            for first in range(task.first, task.first + task.count, study.largest_piece)
+        ]
+    )
 
 
-def lost(study: Study, task: Task, message: str) -> Piece:
+def lost(study: Plan, task: Task, message: str) -> Piece:
     """A piece without results, each of whose runs failed with this message; for a bound, one that is not known, and why."""
     if not task.count:
         return Piece(task, no_bound(study), ((-1, -1, message),))
@@ -45,7 +43,7 @@ def lost(study: Study, task: Task, message: str) -> Piece:
     return _piece(task, found)
 
 
-def _run(study: Study, task: Task) -> Piece:
+def _run(study: Plan, task: Task) -> Piece:
     runs = simulated(study, task)
     found: list[tuple[Scored, list[str]]] = []
     for label, estimator in study.variants.items():
@@ -67,7 +65,7 @@ def _piece(task: Task, found: list[tuple[Scored, list[str]]]) -> Piece:
     return Piece(task, arrays, tuple(messages))
 
 
-def _estimated(study: Study, label: str, estimator: Any, runs: Runs) -> list[tuple[Scored, list[str]]]:
+def _estimated(study: Plan, label: str, estimator: Any, runs: Runs) -> list[tuple[Scored, list[str]]]:
     """Scores and messages of every view of one estimator."""
     views = views_of(estimator)
     M, G, T = len(runs.truth), len(study.groups), len(study.kept)
@@ -89,7 +87,7 @@ def _filters_in_lanes(estimator: Any, belief: Problem) -> bool:
     return plain and belief.runs_in_lanes and not belief.considered and prior_ratio(belief) <= DIFFUSE
 
 
-def _filter(study: Study, runs: Runs, left: list[int], out: Scored) -> list[int]:
+def _filter(study: Plan, runs: Runs, left: list[int], out: Scored) -> list[int]:
     """Put the scores of the extended Kalman filter of these runs in place; returns the runs that need a closer look."""
     if not left:
         return []
@@ -114,7 +112,7 @@ def _filter(study: Study, runs: Runs, left: list[int], out: Scored) -> list[int]
     return [run for i, run in enumerate(left) if not sound[i]]
 
 
-def _one(study: Study, label: str, estimator: Any, runs: Runs, i: int) -> dict[str, tuple[Scored, str]]:
+def _one(study: Plan, label: str, estimator: Any, runs: Runs, i: int) -> dict[str, tuple[Scored, str]]:
     """Scores and message of every view of one run."""
     try:
         estimate = estimator.estimate(runs.belief, runs.tracking(i))

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from functools import cached_property
 from itertools import product
 from math import prod
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,13 +18,9 @@ from piazzi.estimate.estimator import View, views_of
 from piazzi.estimate.registry import parse
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
-from piazzi.scenarios import load_scenario
 from piazzi.scenarios.write import problem_to_tables
 from piazzi.simulation import Rule, check_times, true_problem
 from piazzi.study.axes import Axis, Value, estimator_settings, problems_at, read_value, split, variant
-
-if TYPE_CHECKING:
-    from piazzi.study.store import Stored
 
 SCHEMA = "piazzi.study/1"
 MOST_POINTS = 100_000
@@ -36,29 +31,8 @@ _PIECE_BYTES = 8e6  # what is worked on at once stays near the processor
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
-    """Simulate, estimate and score `runs` seeds at every point of a grid.
-
-    Parameters
-    ----------
-    problem : Problem, with its truth half
-    times : (K,) seconds, strictly increasing
-    estimators : names as on the command line, or a mapping of the name to show to such a name or an estimator
-    runs : int
-    seed : int
-        Of everything.  Draws of prior, process and measurement noise of a run are children of it by the run's number: a run is
-        the same whatever else is run, and at every point of the grid.
-    vary : mapping of name to values
-        Settings of estimators (``lag``, ``iterations``, ``gate``, ...), each for those that have it; ``R.scale``,
-        ``R.STATION.scale``, ``Q.scale``, ``P.scale``, ``substeps`` and parameters by name, for the problem.  A number of the
-        problem changes what estimators believe and what happens; with ``assumed.`` or ``truth.`` before it, one of the two.
-    name : str, for the record
-
-    Raises
-    ------
-    ValueError
-        For unknown names (with the nearest), values that do not fit, or a grid beyond reason.
-    """
+class Plan:
+    """Which runs of which estimators; `Study` says what each field is."""
 
     problem: Problem
     times: Any
@@ -79,19 +53,6 @@ class Study:
         if not self.problem.stations:
             raise ValueError("the problem has no stations, so nothing can be measured")
         self._check()
-
-    @classmethod
-    def of(cls, scenario: str | os.PathLike[str], **changes: Any) -> Study:
-        """The study of a scenario, by name or path: as its section [study] says, with these changes."""
-        found = load_scenario(scenario)
-        plan = found.study
-        given: dict[str, Any] = {
-            "estimators": plan.estimators or ("ekf",),
-            "runs": plan.runs or 100,
-            "vary": plan.vary,
-            "name": found.name,
-        } | changes
-        return cls(found.problem, found.times, **given)
 
     def _check(self) -> None:
         """Refuse what no run could do, before the first."""
@@ -193,12 +154,6 @@ class Study:
         model, S = self.problem.model, len(self.problem.stations)
         numbers = len(self.times) * (2 * model.n + 2 * len(self.groups) + 1 + 3 * S * model.width)
         return int(max(8, _PIECE_BYTES // (8 * numbers)))
-
-    def run(self, path: str | os.PathLike[str], **options: Any) -> Stored:
-        """Run into a NetCDF file; see `piazzi.study.execute.run_study` for the options."""
-        from piazzi.study.execute import run_study
-
-        return run_study(self, path, **options)
 
     # ---- what it is known by -------------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ from queue import Empty, SimpleQueue
 from typing import IO, Protocol
 
 from piazzi.study.pieces import run_task
-from piazzi.study.plan import Study
+from piazzi.study.plan import Plan
 from piazzi.study.tasks import Piece, Task
 
 _LENGTH = struct.Struct("<Q")
@@ -61,7 +61,7 @@ class Here:
 
     slots = 1
 
-    def __init__(self, study: Study) -> None:
+    def __init__(self, study: Plan) -> None:
         self._study, self._tasks = study, list[Task]()
 
     def submit(self, task: Task) -> None:
@@ -87,7 +87,7 @@ class Processes:
     the first has finished a task: by then, every kernel is compiled.
     """
 
-    def __init__(self, study: Study, count: int) -> None:
+    def __init__(self, study: Plan, count: int) -> None:
         self.slots = count
         self._first = pickle.dumps(study)
         self._tasks: SimpleQueue[Task | None] = SimpleQueue()

@@ -9,7 +9,7 @@ from math import ceil
 
 from piazzi.study.log import Log
 from piazzi.study.pieces import lost
-from piazzi.study.plan import Study
+from piazzi.study.plan import Plan
 from piazzi.study.pool import Outcome, Workers
 from piazzi.study.tasks import Piece, Task
 
@@ -25,7 +25,7 @@ class Runner:
     """One execution of a study; what it has done already is in the log."""
 
     def __init__(
-        self, study: Study, log: Log, workers: Workers, chunk: int | None = None, progress: Progress | None = None
+        self, study: Plan, log: Log, workers: Workers, chunk: int | None = None, progress: Progress | None = None
     ) -> None:
         self._study, self._log, self._workers, self._chunk = study, log, workers, chunk
         self._progress = progress or (lambda done, total: None)
@@ -119,7 +119,7 @@ class Runner:
         self.done += piece.task.count
 
 
-def missing(study: Study, log: Log) -> Iterator[Task]:
+def missing(study: Plan, log: Log) -> Iterator[Task]:
     """What the log does not have: gaps in the runs of every point, and bounds."""
     have: dict[int, list[tuple[int, int]]] = {}
     bounds = set()

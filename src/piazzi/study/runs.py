@@ -12,7 +12,7 @@ from piazzi.problem.checks import Array
 from piazzi.simulation import check_finite, propagate, true_problem
 from piazzi.study.draws import Draws, draw, why_refused
 from piazzi.study.lanes import Layout, compiles, simulate_runs
-from piazzi.study.plan import Study
+from piazzi.study.plan import Plan
 from piazzi.study.tasks import Task
 
 
@@ -35,13 +35,13 @@ class Runs:
 
 
 @lru_cache(maxsize=4)
-def _at_point(study: Study, point: int) -> tuple[Problem, Problem, Problem, Layout, Layout]:
+def _at_point(study: Plan, point: int) -> tuple[Problem, Problem, Problem, Layout, Layout]:
     """The problem as it is measured, as it is believed to be and as it moves; layouts of the first two."""
     world, belief = study.problems(point)
     return world, belief, true_problem(world), Layout(world, study.times), Layout(belief, study.times)
 
 
-def simulated(study: Study, task: Task) -> Runs:
+def simulated(study: Plan, task: Task) -> Runs:
     """Truths and measurements of the runs of a task."""
     world, belief, actual, layout, believed = _at_point(study, task.point)
     draws = draw(world, actual, task.runs, study.seed, len(study.times))

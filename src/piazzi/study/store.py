@@ -1,44 +1,25 @@
-"""A finished study in one NetCDF-4 file, written piece by piece, and read row by row."""
+"""A finished study in one NetCDF-4 file, read row by row; and its summary."""
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from piazzi.io import hdf5
 from piazzi.problem.checks import Array
-from piazzi.study.log import Log
-from piazzi.study.plan import SCHEMA, Study
+from piazzi.study.plan import SCHEMA
 from piazzi.study.schema import check_about, check_arrays
 from piazzi.study.score import NUMBERS
-from piazzi.study.tasks import Piece, Task
+from piazzi.study.summary import QUANTILES, Line, Row, line_of
 
-if TYPE_CHECKING:
-    from piazzi.study.summary import Summary
-
-_RUNS_TOGETHER = 256
-_WRITTEN_TOGETHER = 1 << 25  # bytes
 _NOT_COMPARED = ("seconds",)
-MOST_MESSAGES = 10_000  # that are kept: which runs failed is known of all
-
-
-@dataclass(frozen=True, eq=False)
-class Row:
-    """What is stored of one estimator in one view at one point: arrays over runs, see `score.Scored`."""
-
-    numbers: Mapping[str, Array]
-    success: Array
-    diverged: Array
-    error: Array
-    nees: Array
-    rank: Array
+MOST_SHOWN = 20  # messages of failed runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +53,6 @@ class Stored:
     @cached_property
     def summary(self) -> Summary:
         """Who diverges how often, how far off they are, whether they know, what it costs."""
-        from piazzi.study.summary import Summary
-
         return Summary(self)
 
     def row(self, point: int, row: int) -> Row:
@@ -97,74 +76,54 @@ class Stored:
             return hdf5.slab(root, "bound", at), hdf5.slab(root, "bound_last_half", at), int(hdf5.slab(root, "bound_runs", at))
 
 
-def write_store(path: str | os.PathLike[str], study: Study, log: Log) -> None:
-    """Write the finished study of a log, whole or not at all; raises OSError."""
-    messages: list[list[Any]] = []
-    unknown: list[list[Any]] = []
-    lost = 0
-    with hdf5.written(path) as file:
-        _create(file, study)
-        for piece in _together(log.pieces()):
-            task = piece.task
-            runs = (slice(None), slice(task.first, task.first + task.count)) if task.count else ()
-            _check_piece(file, log, piece, runs)
-            for name, values in piece.arrays.items():
-                file.variables[name][(task.point, *runs)] = values
-            if not task.count:
-                unknown += [[task.point, text] for *_, text in piece.messages]
-                continue
-            room = MOST_MESSAGES - len(messages)
-            messages += [[task.point, row, run, text] for row, run, text in piece.messages[:room]]
-            lost += max(0, len(piece.messages) - room)
-        told = {"messages": sorted(messages), "messages_left_out": lost, "bounds_unknown": unknown}
-        _write_text(file, "about", {**_about(study), **told})
+@dataclass(frozen=True, eq=False)
+class Summary:
+    """A study's results in short."""
 
+    stored: Stored
 
-def _check_piece(file: Any, log: Log, piece: Piece, runs: tuple[slice, ...]) -> None:
-    """Raise ValueError where a piece does not hold what the study keeps of such runs."""
-    task = piece.task
-    wanted = {n for n, v in file.variables.items() if v.dimensions[:1] == ("point",) and ("run" in v.dimensions) == bool(runs)}
-    if piece.arrays.keys() != wanted:
-        different = sorted(piece.arrays.keys() ^ wanted)[0]
-        raise ValueError(
-            f"{log.path}: point {task.point}, runs from {task.first}: {different!r} is missing, or not of this study"
+    @cached_property
+    def lines(self) -> tuple[Line, ...]:
+        """A line for every point and row of the study, in order."""
+        stored = self.stored
+        return tuple(
+            line_of(at, label, view, stored.groups, stored.row(point, row), stored.bound(point, view))
+            for point, values in enumerate(stored.points)
+            for at in [dict(zip(stored.about["axes"], values, strict=True))]
+            for row, (label, view) in enumerate(stored.rows)
         )
-    for name, values in piece.arrays.items():
-        shape = file.variables[name].shape[1:]
-        shape = (shape[0], task.count, *shape[2:]) if runs else shape
-        if shape != values.shape:
-            text = f"{name!r} has shape {values.shape}, not {shape}"
-            raise ValueError(f"{log.path}: point {task.point}, runs from {task.first}: {text}")
 
+    @property
+    def success(self) -> bool:
+        """Whether every run of every estimator finished."""
+        return not any(line.failed for line in self.lines)
 
-def _together(pieces: Iterable[Piece]) -> Iterator[Piece]:
-    """The pieces, those of neighbouring runs as one up to a size: a variable is written as fast for hundreds as for one."""
-    waiting: list[Piece] = []
-    for piece in pieces:
-        if waiting and not _goes_with(piece, waiting):
-            yield _joined(waiting)
-            waiting = []
-        waiting.append(piece)
-    if waiting:
-        yield _joined(waiting)
-
-
-def _goes_with(piece: Piece, before: Sequence[Piece]) -> bool:
-    last, size = before[-1].task, sum(a.nbytes for p in (*before, piece) for a in p.arrays.values())
-    if piece.arrays.keys() != before[-1].arrays.keys():
-        return False
-    next_to = (piece.task.point, piece.task.first) == (last.point, last.first + last.count)
-    return next_to and piece.task.count > 0 and last.count > 0 and size <= _WRITTEN_TOGETHER
-
-
-def _joined(pieces: Sequence[Piece]) -> Piece:
-    """One piece of runs that follow each other; their axis is the second."""
-    if len(pieces) == 1:
-        return pieces[0]
-    first = pieces[0].task
-    task = Task(first.point, first.first, sum(p.task.count for p in pieces))
-    arrays = {name: np.concatenate([p.arrays[name] for p in pieces], axis=1) for name in pieces[0].arrays}
-    return Piece(task, arrays, tuple(m for p in pieces for m in p.messages))
+    def to_dict(self) -> dict[str, Any]:
+        """The object of schema piazzi.study/1."""
+        about = self.stored.about
+        specification = about["specification"]
+        return {
+            "schema": SCHEMA,
+            "source": specification["name"],
+            "runs": specification["runs"],
+            "seed": specification["seed"],
+            "epochs": about["epochs"],
+            "states": about["states"],
+            "axes": specification["vary"],
+            "digest": about["digest"],
+            "quantiles": list(QUANTILES),
+            "times": self.stored.times.tolist(),
+            "rows": [line.to_dict() for line in self.lines],
+            "messages": [
+                {"point": point, "estimator": stored_row[0], "view": stored_row[1], "run": run, "message": text}
+                for point, row, run, text in about["messages"][:MOST_SHOWN]
+                for stored_row in [self.stored.rows[row]]
+            ],
+            "bounds_unknown": [
+                {"point": point, "message": text}
+                for point, text in about.get("bounds_unknown", [])  # not in earlier stores
+            ],
+        }
 
 
 def read_store(path: str | os.PathLike[str]) -> Stored:
@@ -192,56 +151,3 @@ def _same(one: Any, other: Any, name: str) -> bool:
     if name not in one or name not in other or one[name].dtype != other[name].dtype or one[name].shape != other[name].shape:
         return False
     return bool(one[name][()].tobytes() == other[name][()].tobytes())
-
-
-def _about(study: Study) -> dict[str, Any]:
-    from importlib.metadata import version
-
-    model = study.problem.model
-    return {
-        "schema": SCHEMA,
-        "piazzi": version("piazzi"),
-        "specification": study.specification,
-        "digest": study.digest,
-        "rows": [list(row) for row in study.rows],
-        "axes": [axis.name for axis in study.axes],
-        "points": [list(study.point(i)) for i in range(study.points)],
-        "groups": list(study.groups),
-        "units": [sorted({model.unit(model.names[i]) for i in columns}) for columns in study.groups.values()],
-        "states": list(model.names),
-        "epochs": len(study.times),
-    }
-
-
-def _create(file: Any, study: Study) -> None:
-    """Dimensions and empty variables."""
-    T, G, R = len(study.kept), len(study.groups), len(study.rows)
-    sizes = {"point": study.points, "row": R, "run": study.runs, "epoch": T, "group": G, "view": 2}
-    file.dimensions = sizes
-    time = file.create_variable("time", ("epoch",), "f8", data=study.times[study.kept])
-    time.attrs["units"] = "s"
-    together = min(study.runs, _RUNS_TOGETHER)
-    per_run = ("point", "row", "run")
-    for name, grouped in NUMBERS.items():
-        dims = (*per_run, "group") if grouped else per_run
-        _variable(file, name, dims, "f8", (1, 1, together, G) if grouped else (1, 1, together), np.nan)
-    for name in ("success", "diverged"):
-        _variable(file, name, per_run, "u1", (1, 1, together), 0)
-    _variable(file, "error", (*per_run, "epoch", "group"), "f4", (1, 1, min(study.runs, 32), T, G), np.nan)
-    _variable(file, "nees", (*per_run, "epoch"), "f4", (1, 1, min(study.runs, 64), T), np.nan)
-    rank = np.min_scalar_type(study.problem.model.n).str  # one byte, unless constants make more than 255 values
-    _variable(file, "rank", (*per_run, "epoch"), rank, (1, 1, min(study.runs, 64), T), 0)
-    _variable(file, "bound", ("point", "view", "epoch", "group"), "f4", (1, 2, T, G), np.nan)
-    for name in ("bound_whole", "bound_last_half"):
-        _variable(file, name, ("point", "view", "group"), "f8", (1, 2, G), np.nan)
-    _variable(file, "bound_runs", ("point", "view"), "i8", (1, 2), 0)
-
-
-def _variable(file: Any, name: str, dims: tuple[str, ...], kind: str, chunks: tuple[int, ...], fill: float) -> None:
-    file.create_variable(name, dims, kind, chunks=chunks, fillvalue=np.dtype(kind).type(fill))
-
-
-def _write_text(file: Any, name: str, document: Mapping[str, Any]) -> None:
-    text = np.frombuffer(json.dumps(document).encode("ascii"), "S1")
-    file.dimensions[f"{name}_characters"] = len(text)
-    file.create_variable(name, (f"{name}_characters",), "S1", data=text)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from math import isfinite, sqrt
 from typing import Any
 
@@ -12,14 +11,23 @@ import numpy as np
 
 from piazzi.evaluate.consistency import epoch_bounds
 from piazzi.problem.checks import Array
-from piazzi.study.plan import SCHEMA
-from piazzi.study.store import Row, Stored
 
 QUANTILES = (0.05, 0.5, 0.95)
 CONFIDENCE = 0.95  # of the interval about a rate
 NEES_CONFIDENCE = 0.99  # of the bounds about a mean over runs
 _Z = 1.959963984540054  # half a normal's width that holds 95 %
-MOST_SHOWN = 20  # messages of failed runs
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """What is stored of one estimator in one view at one point: arrays over runs, see `score.Scored`."""
+
+    numbers: Mapping[str, Array]
+    success: Array
+    diverged: Array
+    error: Array
+    nees: Array
+    rank: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,60 +138,11 @@ class Line:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Summary:
-    """A study's results in short."""
-
-    stored: Stored
-
-    @cached_property
-    def lines(self) -> tuple[Line, ...]:
-        """A line for every point and row of the study, in order."""
-        stored = self.stored
-        axes = stored.about["axes"]
-        return tuple(
-            _line(stored, dict(zip(axes, values, strict=True)), point, row)
-            for point, values in enumerate(stored.points)
-            for row in range(len(stored.rows))
-        )
-
-    @property
-    def success(self) -> bool:
-        """Whether every run of every estimator finished."""
-        return not any(line.failed for line in self.lines)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object of schema piazzi.study/1."""
-        about = self.stored.about
-        specification = about["specification"]
-        return {
-            "schema": SCHEMA,
-            "source": specification["name"],
-            "runs": specification["runs"],
-            "seed": specification["seed"],
-            "epochs": about["epochs"],
-            "states": about["states"],
-            "axes": specification["vary"],
-            "digest": about["digest"],
-            "quantiles": list(QUANTILES),
-            "times": self.stored.times.tolist(),
-            "rows": [line.to_dict() for line in self.lines],
-            "messages": [
-                {"point": point, "estimator": stored_row[0], "view": stored_row[1], "run": run, "message": text}
-                for point, row, run, text in about["messages"][:MOST_SHOWN]
-                for stored_row in [self.stored.rows[row]]
-            ],
-            "bounds_unknown": [
-                {"point": point, "message": text}
-                for point, text in about.get("bounds_unknown", [])  # not in earlier stores
-            ],
-        }
-
-
-def _line(stored: Stored, point: dict[str, Any], index: int, row: int) -> Line:
-    found, (label, view) = stored.row(index, row), stored.rows[row]
-    good, groups = found.success, stored.groups
-    bound, bound_last_half, same = stored.bound(index, view)
+def line_of(
+    point: Mapping[str, Any], label: str, view: str, groups: list[str], found: Row, bounds: tuple[Array, Array, int]
+) -> Line:
+    """The line of one row; `bounds` over time, over the last half, and of how many of the first runs."""
+    good, (bound, bound_last_half, same) = found.success, bounds
     done = int(good.sum())
     lost = int((found.diverged & good).sum())
     whole, half = (_rms(groups, found.numbers[k][good]) for k in ("rmse", "rmse_last_half"))

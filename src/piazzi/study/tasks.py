@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from piazzi.problem.checks import Array
 
@@ -31,3 +33,13 @@ class Piece:
     task: Task
     arrays: Mapping[str, Array]
     messages: tuple[tuple[int, int, str], ...] = ()
+
+
+def joined(pieces: Sequence[Piece]) -> Piece:
+    """One piece of runs that follow each other; their axis is the second."""
+    if len(pieces) == 1:
+        return pieces[0]
+    first = pieces[0].task
+    task = Task(first.point, first.first, sum(p.task.count for p in pieces))
+    arrays = {name: np.concatenate([p.arrays[name] for p in pieces], axis=1) for name in pieces[0].arrays}
+    return Piece(task, arrays, tuple(m for p in pieces for m in p.messages))

@@ -27,8 +27,7 @@ def window_trade(ax: Axes, trade: WindowTrade, group: str) -> Axes:
     """
     if group not in trade.groups:
         raise ValueError(f"no errors of group {group!r}; known: {', '.join(trade.groups) or 'none, without truth'}")
-    rows = [*trade.realtime, *trade.delayed, *([trade.graph] if trade.graph else [])]
-    show = row_display(trade.problem.model, rows, group)
+    show = row_display(trade.problem.model, trade.all_rows, group)
     values = {view: trade.rmse(group, view) * show.factor for view, _, _ in _STYLES}
     graph = trade.graph.rmse_last_half.get(group) if trade.graph else None
     _against_length(ax, trade, values, None if graph is None else graph * show.factor)

@@ -73,7 +73,7 @@ def _sections(views: Views, planet_radius: float | None) -> list[Section]:
 
 def _table(comparison: Comparison, views: Views) -> Section:
     """What the terminal shows, all columns of it."""
-    shown = columns(comparison)
+    shown = columns(comparison.problem.model, comparison.rows, comparison.tracking.values)
     heads = [(c.name, ", ".join(filter(None, (c.part, c.unit)))) for c in shown]
     order = {pair: i for i, pair in enumerate(views.found)}
     keys = [order.get((row.estimator, row.view), -1) for row in comparison.rows]

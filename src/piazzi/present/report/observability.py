@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from piazzi.evaluate import Observability
-from piazzi.evaluate.observable_display import grids, sentences
 from piazzi.evaluate.quantities import Display
 from piazzi.present.colours import STATIONS
 from piazzi.present.figures.style import time_display
@@ -37,13 +36,13 @@ def observability_tab(found: Observability, *, title: str = "") -> Tab:
 def observability_section(found: Observability, *, words: bool = True) -> Section:
     """Singular values and Cramer-Rao sigmas over time, directions, and twins."""
     says = [Text([f"{point.heading}: {point.text}" for point in said(found)])] if words else []
-    return Section("Observability", [*says, _singular_values(found), _sigmas(found), *map(table_of, grids(found))], _INTRO)
+    return Section("Observability", [*says, _singular_values(found), _sigmas(found), *map(table_of, found.grids())], _INTRO)
 
 
 def said(found: Observability) -> list[Point]:
     """The verdict's sentences under headings of their own: what it calls verdict first."""
     points: list[Point] = []
-    for line in sentences(found):
+    for line in found.sentences():
         heading, colon, rest = line.partition(": ")
         if colon and heading in _HEADINGS:
             rest = rest if heading == "Twin" else rest[:1].upper() + rest[1:]  # which begins with the name of a state

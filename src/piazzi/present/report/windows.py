@@ -10,7 +10,6 @@ from piazzi.evaluate import WindowTrade
 from piazzi.evaluate.display import row_display
 from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.quantities import Display, ideal
-from piazzi.evaluate.window_trade_display import grids, sentences
 from piazzi.present.colours import COLOURS, DASHES
 from piazzi.present.report.blocks import Axis, Chart, Line, Point, Section, Tab, Table, Text
 from piazzi.present.tables import summary
@@ -23,7 +22,7 @@ _INTRO = "Errors and NEES of the last half of the run, and cost, against the num
 
 def windows_tab(trade: WindowTrade, *, title: str = "") -> Tab:
     """A window trade by itself."""
-    says = [Point("Window length", " ".join(sentences(trade)), "good" if trade.success else "bad")]
+    says = [Point("Window length", " ".join(trade.sentences()), "good" if trade.success else "bad")]
     subtitle = summary(trade.problem, trade.tracking, trade.source or "measurements")
     return Tab(title or trade.source or "Windows", subtitle, says, [windows_section(trade, words=False)])
 
@@ -33,8 +32,8 @@ def windows_section(trade: WindowTrade, *, words: bool = True) -> Section:
     nees = [_nees(trade)] if trade.ideal_nees(*_NAMES) else []  # none without a truth, nor where nothing is uncertain
     charts = [*(_errors(trade, group) for group in trade.groups), *nees, _cost(trade)]
     timing = [] if trade.timing is None else [_timing(trade.timing.epochs, trade.timing.seconds)]
-    tables = [table_of(grid) for grid in grids(trade)]
-    says = [Text(sentences(trade))] if words else []
+    tables = [table_of(grid) for grid in trade.grids()]
+    says = [Text(trade.sentences())] if words else []
     return Section("Window length", [*says, *charts, *timing, *tables], _INTRO)
 
 
@@ -64,8 +63,7 @@ def _lines(trade: WindowTrade, values: dict[str, Array], graph: float | None) ->
 
 
 def _errors(trade: WindowTrade, group: str) -> Chart:
-    rows = [*trade.realtime, *trade.delayed, *([trade.graph] if trade.graph else [])]
-    show = row_display(trade.problem.model, rows, group)
+    show = row_display(trade.problem.model, trade.all_rows, group)
     values = {view: trade.rmse(group, view) for view in _NAMES}
     graph = trade.graph.rmse_last_half.get(group) if trade.graph else None
     return _chart(trade, f"RMSE of {group}, last half", Axis(f"{group} RMSE", show, "log"), _lines(trade, values, graph))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 
 from piazzi.evaluate import Comparison, Row
-from piazzi.evaluate.display import group_display
+from piazzi.evaluate.display import row_display
 from piazzi.evaluate.judgement import (
     CLEARLY,
     CONSISTENT,
@@ -86,7 +86,7 @@ def _bound(comparison: Comparison, row: Row, group: str) -> str:
     bound = (row.crlb_last_half if row.view == "realtime" else row.crlb).get(group)
     if bound is None or not isfinite(bound):
         return ""
-    show = group_display(comparison, group)
+    show = row_display(comparison.problem.model, comparison.rows, group)
     return f". The Cramer-Rao bound, a mean over many such runs, is {number(bound * show.factor, 3)}{show.suffix}"
 
 
@@ -99,7 +99,7 @@ def _errors(comparison: Comparison, row: Row) -> str:
     parts = []
     for group, value in _counted(row).items():
         if value is not None:
-            show = group_display(comparison, group)
+            show = row_display(comparison.problem.model, comparison.rows, group)
             parts.append(f"{group} error {number(value * show.factor)}{show.suffix}")
     return f"{listed(parts)} (RMS)"
 
@@ -187,7 +187,7 @@ def _settling(comparison: Comparison, rows: Sequence[Row]) -> list[Point]:
             sizes.append(whole)
     if not slow:
         return []
-    show = group_display(comparison, group)
+    show = row_display(comparison.problem.model, comparison.rows, group)
     ends = dict.fromkeys(f"{number(v * show.factor, 3)}{show.suffix}" for v in (min(sizes), max(sizes)))
     text = f"Over the whole run the {group} error of {_named(slow, rows)} is {' to '.join(ends)} (RMS)"
     return [Point("Slow to converge", f"{text}: do not use the first estimates{_settled(slow)}.", "bad")]
