@@ -285,7 +285,6 @@ def _alive(pid):
         return False
 
 
-@pytest.mark.filterwarnings("default:.*record damaged:UserWarning")
 @pytest.mark.parametrize(
     "task", [(0, int(8e100), 4), (0, 0, 10**30), (7, 0, 4), (0, 58, 4), (0, -4, 4), (0.0, 0, 4), ("0", 0, 4)]
 )
@@ -297,8 +296,58 @@ def test_runs_that_are_none_of_the_study_are_run_again(whole, tmp_path, task):
     log = Log.create(tmp_path / "s.nc.runs", study.specification | {"versions": fingerprint()})
     log.append(Piece(Task(*task), {"nonsense": np.zeros((1, 4))}))
     log.close()
-    run_study(study, path, workers=0, resume=True)
+    with pytest.warns(UserWarning, match="1 record damaged; 0 runs are whole"):
+        run_study(study, path, workers=0, resume=True)
     assert same_results(expected, path) == []
+
+
+def _without(name):
+    return lambda p: Piece(p.task, {n: a for n, a in p.arrays.items() if n != name}, p.messages)
+
+
+def _array(name, change):
+    return lambda p: Piece(p.task, p.arrays | {name: change(p.arrays[name])}, p.messages)
+
+
+@pytest.mark.parametrize(
+    ("count", "change"),
+    [
+        (8, _without("rmse")),
+        (8, _array("rmse", lambda a: a[:, :5])),
+        (8, _array("rmse", lambda a: a[..., :-1])),
+        (8, _array("rmse", lambda a: a.astype(np.float32))),
+        (8, _array("success", lambda a: a.astype(bool))),
+        (8, lambda p: Piece(p.task, p.arrays, ((99, 3, "of no row"),))),
+        (8, lambda p: Piece(Task(0, 0, 7), p.arrays)),
+        (8, lambda p: Piece(Task(0, 0, 0), p.arrays)),
+        (0, lambda p: Piece(Task(0, 0, 8), p.arrays)),
+        (0, _array("bound", lambda a: a[:, 1:])),
+    ],
+)
+def test_pieces_that_the_study_does_not_keep_are_computed_again(whole, tmp_path, count, change):
+    """They were found when the store was written, after everything else was computed, and each --resume ended there."""
+    study, expected = whole
+    path, two = tmp_path / "s.nc", [pieces.run_task(study, Task(0, first, 8)) for first in (0, 8)]
+    if not count:
+        two[0] = pieces.run_task(study, Task(0, 0, 0))
+    log = Log.create(tmp_path / "s.nc.runs", study.specification | {"versions": fingerprint()})
+    log.append(change(two[0]))
+    log.append(two[1])
+    log.close()
+    with pytest.warns(UserWarning, match="1 record damaged; 8 runs are whole, the others are computed again"):
+        run_study(study, path, workers=0, resume=True)
+    assert same_results(expected, path) == []
+
+
+def test_a_bound_that_is_not_known_is_gone_on_with(whole, tmp_path):
+    study, _ = whole
+    log = Log.create(tmp_path / "s.nc.runs", study.specification | {"versions": fingerprint()})
+    log.append(pieces.lost(study, Task(0, 0, 0), "why"))
+    log.append(pieces.lost(study, Task(0, 3, 2), "why not"))
+    log.close()
+    told = run_study(study, tmp_path / "s.nc", workers=0, resume=True).about
+    assert told["bounds_unknown"] == [[0, "why"]]
+    assert sorted(told["messages"]) == [[0, row, run, "why not"] for row in range(len(study.rows)) for run in (3, 4)]
 
 
 def test_runs_in_other_lanes_are_not_gone_on_with(tmp_path, monkeypatch):

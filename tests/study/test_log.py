@@ -235,7 +235,7 @@ def test_a_record_full_of_holes_is_looked_at_in_parts(path):
     """It declares a gigabyte, and the file has no byte of it on disk."""
     size = 2**30
     checksum = hashlib.sha256()
-    header = json.dumps({"task": [1, 9, 1], "arrays": [], "messages": []}).encode()
+    header = json.dumps({"task": [1, 9, 1], "arrays": [["a", "|u1", [size]]], "messages": []}).encode()
     checksum.update(struct.pack("<Q", len(header)) + header)
     for _ in range(size >> 20):
         checksum.update(bytes(2**20))
@@ -257,7 +257,7 @@ def resealed(path, change):
     with open(path, "rb") as file:
         assert _read(file) is not None
         head_end = file.tell()
-        header, body = _read(file)
+        header, body, _ = _read(file)
         rest = file.read()
     start = path.read_bytes()[:head_end]
     path.write_bytes(start + _record(*change(header, body)) + rest)
@@ -269,6 +269,9 @@ CHANGES = {
     "arrays": lambda h, b: (h | {"arrays": [["rmse"]]}, b),
     "kind": lambda h, b: (h | {"arrays": [[n, "O", s] for n, _, s in h["arrays"]]}, b),
     "messages": lambda h, b: (h | {"messages": ["x"]}, b),
+    "run of a message": lambda h, b: (h | {"messages": [[0, 3, "of the next piece"]]}, b),
+    "size": lambda h, b: (h, b[:-8]),
+    "more than is": lambda h, b: (h | {"arrays": [["a", "<f8", [2**39] * 8]]}, b),
 }
 
 
@@ -282,12 +285,27 @@ def test_records_with_right_sums_and_wrong_contents_are_damage(path, change):
     assert path.with_name(path.name + ".damaged").exists()
 
 
-def test_a_body_of_another_size_is_refused_with_its_place(path):
-    resealed(path, lambda h, b: (h, b[:-8]))
-    again = Log.open(path)
-    with pytest.raises(ValueError, match=rf"{path}, byte \d+: a record declares arrays of \d+ bytes and holds \d+"):
-        list(again.pieces())
+def test_a_bound_that_is_not_known_is_no_damage(path):
+    log = Log.open(path)
+    log.append(Piece(Task(1, 0, 0), {"bound": np.zeros(2)}, ((-1, -1, "why"),)))
+    log.close()
+    again = Log.open(path)  # without a warning
+    assert [p.messages for p in again.pieces() if not p.task.count] == [((-1, -1, "why"),)]
     again.close()
+
+
+def test_what_is_refused_by_its_specification_stays_as_it_is(path):
+    path.write_bytes(path.read_bytes()[:-1] + b"damaged and torn")
+    before = path.read_bytes()
+
+    def refuse(specification):
+        assert specification == SPECIFICATION
+        raise ValueError("another study")
+
+    with pytest.raises(ValueError, match="another study"):
+        Log.open(path, refuse)  # without a warning, too
+    assert path.read_bytes() == before
+    assert os.listdir(path.parent) == [path.name]
 
 
 def test_a_flipped_bit_loses_at_most_the_record_that_it_hits(path):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Mapping
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -14,11 +13,11 @@ from piazzi.scenarios import load_scenario
 from piazzi.study.log import ENDING, Log
 from piazzi.study.plan import Plan
 from piazzi.study.pool import Here, Processes, Workers, processors
+from piazzi.study.resume import checks, difference
 from piazzi.study.runner import Progress, Runner
 from piazzi.study.store import Stored, read_store
 from piazzi.study.storing import write_store
-from piazzi.study.tasks import Task
-from piazzi.study.versions import difference_of, fingerprint
+from piazzi.study.versions import fingerprint
 
 
 class Study(Plan):
@@ -142,9 +141,9 @@ def _finished(study: Plan, store: Path, resume: bool) -> Stored | None:
     if not store.exists():
         return None
     found = read_store(store)
-    difference = _difference(found.about["specification"], study.specification)
-    if difference:
-        raise ValueError(f"{store} holds another study: {difference}")
+    differs = difference(found.about["specification"], study.specification)
+    if differs:
+        raise ValueError(f"{store} holds another study: {differs}")
     if not resume:
         raise ValueError(f"{store} holds this study, finished: --resume shows it, another name or no file there runs it anew")
     return found
@@ -155,37 +154,7 @@ def _log(study: Plan, path: Path, resume: bool) -> Log:
         return Log.create(path, study.specification | {"versions": fingerprint()})
     if not resume:
         raise ValueError(f"{path} has runs of a study that was not finished: --resume continues it, removing it starts again")
-    log = Log.open(path)
-    versions = log.specification.pop("versions", None)
-    difference = _difference(log.specification, study.specification)
-    if difference:
-        log.close()
-        raise ValueError(f"{path} has runs of another study: {difference}")
-    change = difference_of(versions if isinstance(versions, dict) else {}, fingerprint())
-    if change:
-        log.close()
-        raise ValueError(f"{path} was begun by {change}: results would not be the same; finish it there, or remove it")
-    log.entries = [entry for entry in log.entries if _belongs(study, entry.task)]  # what does not is damage: it is run again
-    return log
-
-
-def _belongs(study: Plan, task: Task) -> bool:
-    """Whether a task is one of the study's: whatever is in a log, this is what the runs that are missing are counted by."""
-    numbers = (task.point, task.first, task.count)
-    whole = all(type(i) is int and i >= 0 for i in numbers)
-    return whole and task.point < study.points and task.first + task.count <= study.runs
-
-
-def _difference(there: Any, here: Mapping[str, Any]) -> str:
-    """What differs first between two specifications, "" where they are equal."""
-    here = json.loads(json.dumps(here))
-    there = there if isinstance(there, dict) else {}
-    for key in (*here, *there):
-        if here.get(key) != there.get(key):
-            if isinstance(here.get(key), (int, str)) and isinstance(there.get(key), (int, str)) and key != "times":
-                return f"{key} is {there[key]!r} there and {here[key]!r} here"
-            return f"its {key} {'are' if key.endswith('s') else 'is'} not the same"
-    return ""
+    return Log.open(path, partial(checks, study, path))
 
 
 def _team(study: Plan, workers: int | None, scheduler: str | None) -> Workers:

@@ -10,16 +10,16 @@ import shutil
 import stat
 import struct
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
 from piazzi.io.atomic import sync_folder
-from piazzi.study.schema import check_body, check_record
+from piazzi.study.schema import check_record
 from piazzi.study.tasks import Piece, Task
 
 LOGGER = logging.getLogger("piazzi.study")
@@ -30,12 +30,23 @@ _LONGEST, _LONGEST_HEADER, _PART = 2**34, 2**30, 2**20
 _LOCKED_BYTE = 2**31 - 2  # Windows keeps others from the bytes that are locked, and locks none behind this one
 
 
+Check = Callable[[Mapping[str, Any]], None]  # of the header of a record; raises ValueError
+
+
 @dataclass(frozen=True)
 class Entry:
     """Where a piece is in the file."""
 
     task: Task
     offset: int
+
+
+class _Record(NamedTuple):
+    """A whole record: what it says, its bytes where they were asked for, and how many they are."""
+
+    header: dict[str, Any]
+    body: bytes
+    size: int
 
 
 class Log:
@@ -61,23 +72,36 @@ class Log:
         return log
 
     @classmethod
-    def open(cls, path: Path) -> Log:
-        """What there is, without the tail that a sudden end left behind; raises OSError, or ValueError for another file."""
+    def open(cls, path: Path, checks: Callable[[dict[str, Any]], Check] | None = None) -> Log:
+        """What there is, without damaged records and the tail that a sudden end left behind.
+
+        Parameters
+        ----------
+        checks : is given the specification before anything is changed, and says what a record has to be; a ValueError of
+            its own refuses the file
+
+        Raises
+        ------
+        OSError, ValueError
+            The second for another file, and where another process runs this study.
+        """
         file = open(path, "r+b", buffering=0)  # noqa: SIM115
         try:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise ValueError(f"{path}: it is a pipe or a device, not a file")
             _lock(file, path)
-            return cls._scan(path, file)
+            return cls._scan(path, file, checks)
         except BaseException:
             file.close()
             raise
 
     @classmethod
-    def _scan(cls, path: Path, file: IO[bytes]) -> Log:
+    def _scan(cls, path: Path, file: IO[bytes], checks: Callable[[dict[str, Any]], Check] | None) -> Log:
         first = _read(file)
-        if first is None or not isinstance(first[0].get("specification"), dict):
+        specification = None if first is None else first.header.get("specification")
+        if not isinstance(specification, dict):
             raise ValueError(f"{path}: no runs of a study are in this file")
+        check = None if checks is None else checks(specification)
         entries, end, damaged = list[Entry](), file.tell(), 0
         while True:
             found = _read(file, body=False)
@@ -90,18 +114,20 @@ class Log:
                 end = file.seek(behind)  # its runs are missing, so they are computed again
                 continue
             try:
-                check_record(found[0])
+                check_record(found.header, found.size)
+                if check is not None:
+                    check(found.header)
             except ValueError as error:
                 LOGGER.debug("%s, byte %d: %s", path, end, error)
                 damaged, end = damaged + 1, file.tell()
                 continue
-            entries.append(Entry(Task(*found[0]["task"]), end))
+            entries.append(Entry(Task(*found.header["task"]), end))
             end = file.tell()
         if damaged:
             _keep_copy(path, damaged, sum(entry.task.count for entry in entries))
         if os.fstat(file.fileno()).st_size > end:
             file.truncate(end)
-        return cls(path, file, first[0]["specification"], entries)
+        return cls(path, file, specification, entries)
 
     def append(self, piece: Piece) -> None:
         """Add a piece, on disk when this returns.
@@ -121,11 +147,7 @@ class Log:
         found = _read(self._file)
         if found is None:
             raise ValueError(f"{self.path}: the runs at byte {entry.offset} were damaged")
-        try:
-            check_body(*found)
-        except ValueError as error:
-            raise ValueError(f"{self.path}, byte {entry.offset}: {error}") from None
-        return _unpacked(*found)
+        return _unpacked(found.header, found.body)
 
     def pieces(self) -> Iterator[Piece]:
         """All pieces, one at a time, in the order of points and runs, whatever the order in which they were finished."""
@@ -163,8 +185,8 @@ def _record(header: dict[str, Any], body: bytes) -> bytes:
     return _HEAD.pack(_MAGIC, len(payload), hashlib.sha256(payload).digest()) + payload
 
 
-def _read(file: IO[bytes], body: bool = True) -> tuple[dict[str, Any], bytes] | None:
-    """Header and body (or b"" where it is not wanted) of the next record; None where there is no whole one.
+def _read(file: IO[bytes], body: bool = True) -> _Record | None:
+    """The next record, with its body where that is wanted; None where there is no whole one.
 
     It is read in parts: a file with holes can declare what no memory holds.
     """
@@ -178,7 +200,8 @@ def _read(file: IO[bytes], body: bool = True) -> tuple[dict[str, Any], bytes] | 
     (size,) = struct.unpack("<Q", start)
     if size > min(length - 8, _LONGEST_HEADER):
         return None
-    text, left, parts = file.read(size), length - 8 - size, list[bytes]()
+    behind = left = length - 8 - size
+    text, parts = file.read(size), list[bytes]()
     checksum = hashlib.sha256(start + text)
     while left > 0 and (part := file.read(min(left, _PART))):
         checksum.update(part)
@@ -190,7 +213,7 @@ def _read(file: IO[bytes], body: bool = True) -> tuple[dict[str, Any], bytes] | 
         header = json.loads(text)
     except (ValueError, RecursionError):
         return None
-    return (header if isinstance(header, dict) else {}), b"".join(parts)
+    return _Record(header if isinstance(header, dict) else {}, b"".join(parts), behind)
 
 
 def _behind(file: IO[bytes], start: int) -> int | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,8 @@ VIEWS = ("realtime", "delayed")
 _MOST = 2**40
 
 
-def check_record(header: Any) -> None:
-    """Raise ValueError unless this is the header of a piece: its task, arrays and messages."""
+def check_record(header: Any, size: int) -> None:
+    """Raise ValueError unless this is the header of a piece, its task, arrays of `size` bytes and messages of its runs."""
     if not isinstance(header, dict):
         raise ValueError("a record holds no table")
     task = header.get("task")
@@ -24,16 +25,12 @@ def check_record(header: Any) -> None:
     arrays = header.get("arrays")
     if not (isinstance(arrays, list) and all(map(_array, arrays)) and len({a[0] for a in arrays}) == len(arrays)):
         raise ValueError("a record does not say which arrays it holds")
+    wanted = sum(prod(shape) * np.dtype(kind).itemsize for _, kind, shape in arrays)
+    if wanted != size:
+        raise ValueError(f"a record declares arrays of {str(wanted)[:60]} bytes and holds {size}")
     messages = header.get("messages")
-    if not (isinstance(messages, list) and all(map(_message, messages))):
+    if not (isinstance(messages, list) and all(_message(m, *task) for m in messages)):
         raise ValueError("a record has messages that are no row, run and text")
-
-
-def check_body(header: Mapping[str, Any], body: bytes) -> None:
-    """Raise ValueError unless the arrays of a piece are what its record holds."""
-    wanted = sum(int(np.prod(shape, dtype=float)) * np.dtype(kind).itemsize for _, kind, shape in header["arrays"])
-    if wanted != len(body):
-        raise ValueError(f"a record declares arrays of {wanted} bytes and holds {len(body)}")
 
 
 def check_about(about: Mapping[str, Any]) -> None:
@@ -94,8 +91,13 @@ def _array(found: Any) -> bool:
     return isinstance(found[2], list) and len(found[2]) <= 8 and all(map(_index, found[2]))
 
 
-def _message(found: Any) -> bool:
-    return isinstance(found, list) and len(found) == 3 and _index(found[0]) and _index(found[1]) and isinstance(found[2], str)
+def _message(found: Any, point: int, first: int, count: int) -> bool:
+    if not (isinstance(found, list) and len(found) == 3 and isinstance(found[2], str)):
+        return False
+    row, run, _ = found
+    if not count:
+        return (row, run) == (-1, -1)  # why a bound is not known
+    return _index(row) and _index(run) and first <= run < first + count
 
 
 def _placed(found: Any) -> bool:

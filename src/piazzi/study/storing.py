@@ -30,7 +30,6 @@ def write_store(path: str | os.PathLike[str], study: Plan, log: Log) -> None:
         for piece in _together(log.pieces()):
             task = piece.task
             runs = (slice(None), slice(task.first, task.first + task.count)) if task.count else ()
-            _check_piece(file, log, piece, runs)
             for name, values in piece.arrays.items():
                 file.variables[name][(task.point, *runs)] = values
             if not task.count:
@@ -41,23 +40,6 @@ def write_store(path: str | os.PathLike[str], study: Plan, log: Log) -> None:
             lost += max(0, len(piece.messages) - room)
         told = {"messages": sorted(messages), "messages_left_out": lost, "bounds_unknown": unknown}
         _write_text(file, "about", {**_about(study), **told})
-
-
-def _check_piece(file: Any, log: Log, piece: Piece, runs: tuple[slice, ...]) -> None:
-    """Raise ValueError where a piece does not hold what the study keeps of such runs."""
-    task = piece.task
-    wanted = {n for n, v in file.variables.items() if v.dimensions[:1] == ("point",) and ("run" in v.dimensions) == bool(runs)}
-    if piece.arrays.keys() != wanted:
-        different = sorted(piece.arrays.keys() ^ wanted)[0]
-        raise ValueError(
-            f"{log.path}: point {task.point}, runs from {task.first}: {different!r} is missing, or not of this study"
-        )
-    for name, values in piece.arrays.items():
-        shape = file.variables[name].shape[1:]
-        shape = (shape[0], task.count, *shape[2:]) if runs else shape
-        if shape != values.shape:
-            text = f"{name!r} has shape {values.shape}, not {shape}"
-            raise ValueError(f"{log.path}: point {task.point}, runs from {task.first}: {text}")
 
 
 def _together(pieces: Iterable[Piece]) -> Iterator[Piece]:
