@@ -17,3 +17,4 @@ def test_the_next_call_is_right_after_a_kill(kind):
     (tally,) = run((kind,), kills=3, seed=5)
     assert tally.kills == 3
     assert tally.wrong == []
+    assert tally.left == []

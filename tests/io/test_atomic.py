@@ -123,7 +123,7 @@ def test_what_a_living_writer_is_writing_stays(tmp_path):
 
 def test_a_file_that_was_swept_before_it_was_locked_is_made_again(tmp_path, monkeypatch):
     """Between its making and its locking, another process may find it without a lock."""
-    real, removed = atomic._lock, []
+    real, removed = atomic.lock, []
 
     def lock_late(handle, wait):
         if not removed:
@@ -132,7 +132,7 @@ def test_a_file_that_was_swept_before_it_was_locked_is_made_again(tmp_path, monk
             removed.append(young)
         return real(handle, wait)
 
-    monkeypatch.setattr(atomic, "_lock", lock_late)
+    monkeypatch.setattr(atomic, "lock", lock_late)
     with atomic_path(tmp_path / "s.nc") as work:
         work.write_text("whole")
         assert work != removed[0]

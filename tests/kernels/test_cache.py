@@ -156,14 +156,44 @@ def test_a_failed_build_leaves_nothing(fresh, monkeypatch):
 
 
 def test_leftovers_of_killed_builds_are_swept_up(fresh, builds):
-    """Old ones: a young one may be another process at work."""
-    for name, age in ((".building-old", 7200), (".damaged-old", 7200), (".building-young", 60)):
+    """Young ones too, but for those of a process that is still at work."""
+    for name, age in ((".building-old", 7200), (".damaged-old", 7200), (".building-young", 60), (".damaged-young", 1)):
         (fresh / name).mkdir(parents=True)
         (fresh / name / "kernels.py").touch()
+        (fresh / name).chmod(0o700)
+        os.utime(fresh / name, times=(time.time() - age,) * 2)
+    fresh.chmod(0o700)
+    with folder.writable_folder().new(".building-") as (alive, _):
+        load_as_a_new_process()
+        assert sorted(p.name for p in fresh.iterdir()) == sorted([alive, SMALL.digest()])
+
+
+def test_without_locks_young_leftovers_stay(fresh, builds, monkeypatch):
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    for name, age in ((".building-old", 7200), (".building-young", 60)):
+        (fresh / name).mkdir(parents=True, mode=0o700)
         os.utime(fresh / name, times=(time.time() - age,) * 2)
     fresh.chmod(0o700)
     load_as_a_new_process()
     assert sorted(p.name for p in fresh.iterdir()) == [".building-young", SMALL.digest()]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders that are open are not removed")
+def test_a_folder_that_was_swept_before_it_was_locked_is_made_again(fresh, builds, monkeypatch):
+    """Between its making and its locking, another process may find it without a lock."""
+    real, removed = folder.lock, []
+
+    def lock_late(handle, wait):
+        if not removed:
+            (young,) = fresh.iterdir()
+            young.rmdir()
+            removed.append(young)
+        return real(handle, wait)
+
+    monkeypatch.setattr(folder, "lock", lock_late)
+    load_as_a_new_process()
+    assert len(removed) == 1
+    assert [p.name for p in fresh.iterdir()] == [SMALL.digest()]
 
 
 def test_finished_by_another_process_meanwhile(fresh, builds):

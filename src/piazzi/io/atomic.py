@@ -13,6 +13,8 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 
+from piazzi.locks import lock
+
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
@@ -74,21 +76,10 @@ def _remove_dead(leftover: str) -> None:
     """Remove a temporary file that nobody is writing."""
     handle = os.open(leftover, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
     try:
-        if _lock(handle, wait=False) and os.fstat(handle).st_uid == os.geteuid():
+        if lock(handle, wait=False) and os.fstat(handle).st_uid == os.geteuid():
             os.unlink(leftover)  # while it is locked: who has just made it finds it gone, and makes another
     finally:
         os.close(handle)
-
-
-def _lock(handle: int, wait: bool) -> bool:
-    """Whether a file is locked for this process now; never where the system or the file system has no such locks."""
-    try:
-        import fcntl
-
-        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except (ImportError, OSError):
-        return False
-    return True
 
 
 def sync_folder(path: str | os.PathLike[str]) -> None:
@@ -147,7 +138,7 @@ def _beside(target: Path) -> tuple[Path, int | None]:
         work = target.with_name(f"{_prefix(target)}{os.urandom(4).hex()}{target.suffix[-40:]}")
         with suppress(FileExistsError):
             handle = os.open(work, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode)
-            if not _lock(handle, wait=True):
+            if not lock(handle, wait=True):
                 os.close(handle)
                 return work, None
             if os.fstat(handle).st_nlink:

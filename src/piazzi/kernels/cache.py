@@ -153,10 +153,8 @@ def _keep(place: Folder, digest: str, source: str, objects: dict[str, bytes], sy
     """Write into a folder of our own and move that into place: two processes may do so at once."""
     with contextlib.suppress(OSError):
         _sweep(place)
-    work = f".building-{os.urandom(4).hex()}"
-    try:
-        place.make(work)
-        with place.inside(work) as home:
+    with place.new(".building-") as (work, home):
+        try:
             home.write("kernels.py", source.encode())
             for name, code in objects.items():
                 home.write(f"{name}.o", code)
@@ -166,16 +164,22 @@ def _keep(place: Folder, digest: str, source: str, objects: dict[str, bytes], sy
             }
             seal = _seal(json.loads(json.dumps(manifest)), digest)
             home.write(MANIFEST, json.dumps(manifest | {"seal": seal}).encode())
-        _move(place, work, digest)
-    finally:
-        place.remove(work)
+            _move(place, work, digest)
+        finally:
+            place.remove(work)
 
 
 def _sweep(place: Folder) -> None:
-    """Remove what builds that were killed left behind: nothing takes an hour to compile."""
+    """Remove what builds that were killed left behind: what no living process has locked, or is an hour old."""
     for name, written in place.ages().items():
-        if name.startswith((".building-", ".damaged-")) and time.time() - written > 3600:
+        if not name.startswith((".building-", ".damaged-")):
+            continue
+        if time.time() - written > 3600:
             place.remove(name)
+            continue
+        with contextlib.suppress(OSError), place.inside(name) as found:
+            if found.hold(wait=False):
+                place.remove(name)
 
 
 def _move(place: Folder, work: str, digest: str) -> None:

@@ -17,6 +17,7 @@ from functools import cache
 from pathlib import Path
 
 from piazzi.kernels.ownership import check_ours, check_way
+from piazzi.locks import lock
 
 _THROUGH_HANDLES = {os.open, os.mkdir, os.rename, os.unlink} <= os.supports_dir_fd and hasattr(os, "O_NOFOLLOW")
 _FOLDER = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
@@ -49,8 +50,24 @@ class Folder:
         try:
             yield found
         finally:
-            if found.handle is not None:
-                os.close(found.handle)
+            found._close()
+
+    @contextmanager
+    def new(self, prefix: str) -> Iterator[tuple[str, Folder]]:
+        """A new folder in here, with its name; it is in use until the block ends."""
+        name, made = self._made(prefix)
+        try:
+            yield name, made
+        finally:
+            made._close()
+
+    def hold(self, wait: bool) -> bool:
+        """Mark this folder as in use for as long as it is open; False where a living process has done so, or it is gone.
+
+        Where there are no locks, all are in use.
+        """
+        locked = self.handle is not None and lock(self.handle, wait)
+        return (locked or wait) and (self.handle is None or os.fstat(self.handle).st_nlink > 0)
 
     def read(self, name: str) -> bytes:
         """The content of a file."""
@@ -84,6 +101,20 @@ class Folder:
         """When each of the things in here was last written to, s."""
         with os.scandir(self.path if self.handle is None else self.handle) as found:
             return {entry.name: entry.stat(follow_symlinks=False).st_mtime for entry in found}
+
+    def _made(self, prefix: str) -> tuple[str, Folder]:
+        while True:
+            name = f"{prefix}{os.urandom(4).hex()}"
+            self.make(name)
+            with suppress(FileNotFoundError):  # removed as one of a dead process, before it was locked
+                made = _opened(self._at(name), self.path / name, self.handle)
+                if made.hold(wait=True):
+                    return name, made
+                made._close()
+
+    def _close(self) -> None:
+        if self.handle is not None:
+            os.close(self.handle)
 
     def _at(self, name: str) -> str:
         return os.fspath(self.path / name) if self.handle is None else name
