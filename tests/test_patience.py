@@ -10,9 +10,11 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 import sympy as sp
 
+import piazzi as pz
 from piazzi.expressions import ExpressionError, patience, symbol, to_sympy
-from piazzi.expressions.patience import TooSlowError, patiently
-from piazzi.model.derivation import jacobian
+from piazzi.expressions.patience import TooSlowError, each_patiently, patiently
+from piazzi.kernels.generate import model_source
+from piazzi.model.derivation import derive, derive_sensor, jacobian
 from tests.waiting import HANGS
 
 SLOW = "1"
@@ -151,3 +153,58 @@ print(sum(i for i in range(3)))
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     assert done.stdout == "3\n"
+
+
+def test_each_of_several_has_the_limit_for_itself():
+    def work(seconds):
+        end = time.thread_time() + seconds
+        while time.thread_time() < end:
+            pass
+        return seconds
+
+    assert each_patiently(work, [0.1] * 6, 0.4) == [0.1] * 6
+    with pytest.raises(TooSlowError) as found:
+        each_patiently(work, [0.1, 0.1, 5.0, 0.1], 0.4)
+    assert found.value.at == 2
+
+
+# A sine of so many turns takes three times as long with each level: for the digits of its argument that it drops.
+DIGITS = "pi/7"
+for _ in range(7):
+    DIGITS = f"sin({DIGITS}*10**20)"
+
+
+def source(**changes):
+    """Of a model that was derived with time enough, when there is no more than 0.05 s for any of its equations."""
+    given = {"states": ["x", "v"], "dynamics": ["v", "-x"], "sensors": [pz.Sensor("s", ["x", "v"])]} | changes
+    model = pz.Model(**given)
+    derive(model)
+    for sensor in model.sensors:
+        derive_sensor(model, sensor)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(patience, "SECONDS", 0.05)
+        return model_source(model, pz.Taylor(2).scheme, 1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "place"),
+    [
+        ({"dynamics": ["v", f"-x*{DIGITS}*v"]}, "the dynamics of v"),  # a common part of v's rate and its derivatives
+        ({"dynamics": ["v", f"{DIGITS}*x"]}, "the dynamics of v"),  # and a constant derivative
+        ({"sensors": [pz.Sensor("s", {"range": "x", "rate": f"sin(v + {DIGITS})"})]}, "rate of sensor s"),
+        ({"definitions": {"d": f"x*{DIGITS}"}, "dynamics": ["d*v", "-x"]}, "definition d"),
+    ],
+)
+def test_code_that_takes_long_is_refused_with_its_equation(changes, place):
+    with pytest.raises(ValueError, match=rf"^code of {place}: SymPy needs more than 0.05 s for this$"):
+        source(**changes)
+
+
+def test_so_are_common_parts_that_take_long_to_find(monkeypatch):
+    monkeypatch.setattr(sp, "cse", lambda *arguments: spin())
+    with pytest.raises(ValueError, match=r"^code of the dynamics of x, the dynamics of v: SymPy needs more than 0.1 s"):
+        source()
+
+
+def test_limits_leave_the_code_as_it_is():
+    assert source(sensors=[]).count("def scalar_f") == 2

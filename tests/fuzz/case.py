@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tests.fuzz.child import End
 
-_MAY_SAY = re.compile(r"piazzi: (warning|compiling)|.*; (skipped|refused|rejected)$|[\d,]+ (points x|runs? x) .* epochs$")
+_MAY_SAY = re.compile(r"piazzi: compiling .*|.*; (skipped|refused|rejected)$|[\d,]+ (points x|runs? x) .* epochs$")
 _HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2028\u2029]")
 _LONGEST = 650
 

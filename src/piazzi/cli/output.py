@@ -82,8 +82,8 @@ def check_place(path: str) -> None:
     target = os.path.realpath(path)
     if not os.path.exists(target) or os.path.isfile(target):
         try:
-            with tempfile.NamedTemporaryFile(dir=os.path.dirname(target), prefix=".piazzi-"):
-                pass  # some folders refuse files whatever their permissions say
+            with tempfile.TemporaryFile(dir=os.path.dirname(target)):
+                pass  # some folders refuse files whatever their permissions say; one without a name leaves nothing
         except OSError as error:
             raise type(error)(error.errno, f"cannot be written: {error.strerror}", path) from None
 

@@ -9,24 +9,37 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
+A = TypeVar("A")
 T = TypeVar("T")
 SECONDS = 5.0  # of a processor, where the system can tell, for one equation
 _AGAIN = 0.2  # seconds after which the interruption is repeated: SymPy catches some
 
 
 class TooSlowError(ValueError):
-    """Something took longer than it may."""
+    """Something took longer than it may: of several things, the one of this number."""
+
+    def __init__(self, seconds: float, at: int) -> None:
+        super().__init__(f"SymPy needs more than {seconds:g} s for this")
+        self.at = at
 
 
 def patiently(call: Callable[[], T], seconds: float | None = None) -> T:
     """What a call returns; raises TooSlowError where it takes more than `seconds` (default: `SECONDS`)."""
-    watch = _Watch(SECONDS if seconds is None else seconds)
+    return each_patiently(lambda _: call(), [None], seconds)[0]
+
+
+def each_patiently(call: Callable[[A], T], items: Sequence[A], seconds: float | None = None) -> list[T]:
+    """What a call makes of each item, in turn; raises TooSlowError where one of them takes more than `seconds`."""
+    watch, done = _Watch(SECONDS if seconds is None else seconds), list[T]()
     try:
         try:
-            return call()
+            for item in items:
+                watch.restart()
+                done.append(call(item))
+            return done
         finally:
             watch.stop()
     except watch.interruption:
@@ -36,7 +49,9 @@ def patiently(call: Callable[[], T], seconds: float | None = None) -> T:
                 break
             except watch.interruption:  # one that was on its way already
                 continue
-        raise TooSlowError(f"SymPy needs more than {watch.seconds:g} s for this") from None
+        if len(done) == len(items):  # it came after the last of them
+            return done
+        raise TooSlowError(watch.seconds, len(done)) from None
 
 
 class _Watch:
@@ -47,8 +62,14 @@ class _Watch:
         self.interruption: type[BaseException] = type("Interruption", (BaseException,), {})
         self.seconds, self._sent = seconds, False
         self._thread, self._used = threading.get_ident(), _clock()
+        self._start = self._used()
         self._lock, self._stopped = threading.Lock(), threading.Event()
         threading.Thread(target=self._run, daemon=True).start()
+
+    def restart(self) -> None:
+        """Begin to count anew."""
+        with self._lock:
+            self._start = self._used()
 
     def stop(self) -> None:
         """End; nothing is interrupted any more when this has returned."""
@@ -58,14 +79,13 @@ class _Watch:
             _interrupt(self._thread, None)
 
     def _run(self) -> None:
-        start, wait = self._used(), self.seconds
+        wait = self.seconds
         while not self._stopped.wait(wait):
-            wait = max(start + self.seconds - self._used(), 0.0) or _AGAIN
-            if wait == _AGAIN:
-                with self._lock:
-                    if not self._stopped.is_set():
-                        self._sent = True
-                        _interrupt(self._thread, self.interruption)
+            with self._lock:
+                wait = self._start + self.seconds - self._used()
+                if wait <= 0 and not self._stopped.is_set():
+                    wait, self._sent = _AGAIN, True
+                    _interrupt(self._thread, self.interruption)
 
 
 def _clock() -> Callable[[], float]:

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from piazzi.kernels.printer import function
+from piazzi.kernels.printer import function, in_time
 from piazzi.kernels.steps import adaptive_source, axes_source, kepler_source, runge_kutta_source
 from piazzi.kernels.steps import inline_source as _inline
 from piazzi.model import Model
@@ -79,20 +79,28 @@ def _identity_source(model: Model) -> str:
 
 
 class _Jacobian:
-    """A Jacobian's entries: those that vary are outputs of the scalar function, the rest are literals in the source."""
+    """A Jacobian's entries: those that vary are outputs of the scalar function, the rest are literals in the source.
 
-    def __init__(self, matrix: sp.Matrix, prefix: str) -> None:
-        self.matrix, self.prefix = matrix, prefix
-        self.varying = [(i, j) for i in range(matrix.rows) for j in range(matrix.cols) if matrix[i, j].free_symbols]
-        self.outputs = [matrix[i, j] for i, j in self.varying]
-        self.names = [f"{prefix}{i}_{j}" for i, j in self.varying]
+    `called` says what the equation of each row is called.
+    """
+
+    def __init__(self, matrix: sp.Matrix, prefix: str, called: Sequence[str]) -> None:
+        self.matrix = matrix
+        varying = [(i, j) for i in range(matrix.rows) for j in range(matrix.cols) if matrix[i, j].free_symbols]
+        self.outputs = [(called[i], matrix[i, j]) for i, j in varying]
+        self.names = [f"{prefix}{i}_{j}" for i, j in varying]
+        self._texts = dict(zip(varying, self.names, strict=True))
+
+        def write(i: int) -> None:
+            for j in range(matrix.cols):
+                if (i, j) not in self._texts and matrix[i, j] != 0:
+                    self._texts[i, j] = repr(float(matrix[i, j]))
+
+        in_time(called.__getitem__, write, range(matrix.rows))
 
     def entry(self, i: int, j: int) -> str:
         """Text of an entry, "" where it is zero."""
-        value = self.matrix[i, j]
-        if value == 0:
-            return ""
-        return f"{self.prefix}{i}_{j}" if value.free_symbols else repr(float(value))
+        return self._texts.get((i, j), "")
 
     def row_times(self, i: int, rows: Sequence[str], width: int) -> str:
         """Row i of the product with the matrix of those rows."""
@@ -109,6 +117,11 @@ class _Jacobian:
         return "vector(" + ", ".join(self.entry(i, j) or "0.0" for j in range(self.matrix.cols)) + ")"
 
 
+def _called(model: Model) -> list[str]:
+    """What the equations of the states are called."""
+    return [f"the dynamics of {name}" for name in model.moving]
+
+
 def _rows(model: Model) -> list[str]:
     """Text of the rows that a Jacobian multiplies: those of R, then the constants' unit rows."""
     nd, n = len(model.moving), model.n
@@ -121,14 +134,14 @@ def _unpack(names: Sequence[str], call: str) -> str:
 
 def _dynamics_source(model: Model) -> str:
     d, (arguments, names, call) = derive(model), _arguments(model)
-    nd, n = len(model.moving), model.n
-    F = _Jacobian(d.F, "F")
+    nd, n, called = len(model.moving), model.n, _called(model)
+    f, F = list(zip(called, d.f, strict=True)), _Jacobian(d.F, "F", called)
     rates = [f"f{i}" for i in range(nd)]
     whole = f"alike(x, {', '.join(rates + ['0.0'] * (n - nd))})"
     rows = ", ".join(F.row_times(i, _rows(model), n) for i in range(nd))
     return (
-        function("scalar_f", arguments, names, list(d.f), d.values)
-        + function("scalar_f_F", arguments, names, list(d.f) + F.outputs, d.partials)
+        function("scalar_f", arguments, names, f, d.values)
+        + function("scalar_f_F", arguments, names, f + F.outputs, d.partials)
         + _inline("dynamics(t, x, p)", _unpack(rates, f"scalar_f({call})"), f"return {whole}")
         + _inline("rhs(t, x, R, p)", _unpack(rates + F.names, f"scalar_f_F({call})"), f"return {whole}, matrix({rows})")
     )
@@ -151,8 +164,8 @@ def _constant_acceleration_source(model: Model) -> str:
     d, (nxt, h) = derive(model), constant_acceleration_step(model)
     arguments, names, call = _arguments(model, ("h",))
     names = {**names, h: "h"}
-    nd, n = len(model.moving), model.n
-    F, rows = _Jacobian(d.F, "F"), _rows(model)
+    nd, n, called = len(model.moving), model.n, _called(model)
+    f, F, rows = list(zip(called, nxt, strict=True)), _Jacobian(d.F, "F", called), _rows(model)
     moving = list(d.x[:nd])
     rates = [moving.index(rate) if rate in moving else i for i, rate in enumerate(d.f)]  # the state whose rate counts
     results = [f"n{i}" for i in range(nd)]
@@ -162,8 +175,8 @@ def _constant_acceleration_source(model: Model) -> str:
     products += [f"V{j} = R[{j}] + h*K{j}" for j in used]
     new = [f"V{i}" if i == j else f"R[{i}] + half*(R[{j}] + V{j})" for i, j in enumerate(rates)]
     return (
-        function("scalar_step", arguments, names, list(nxt), d.values)
-        + function("scalar_step_F", arguments, names, list(nxt) + F.outputs, d.partials)
+        function("scalar_step", arguments, names, f, d.values)
+        + function("scalar_step_F", arguments, names, f + F.outputs, d.partials)
         + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
         + _inline(
             "substep_jacobian(t, h, x, R, p)",
@@ -179,14 +192,14 @@ def _map_source(model: Model) -> str:
     """A step given as a formula: its Jacobian is derived."""
     d, (arguments, names, call) = derive(model), _arguments(model, ("h",))
     names = {**names, d.dt: "h"}
-    nd, n = len(model.moving), model.n
-    G = _Jacobian(d.F, "G")
+    nd, n, called = len(model.moving), model.n, _called(model)
+    f, G = list(zip(called, d.f, strict=True)), _Jacobian(d.F, "G", called)
     results = [f"n{i}" for i in range(nd)]
     whole = f"alike(x, {', '.join(results + [f'x[{i}]' for i in range(nd, n)])})"
     rows = ", ".join(G.row_times(i, _rows(model), n) for i in range(nd))
     return (
-        function("scalar_step", arguments, names, list(d.f), d.values)
-        + function("scalar_step_G", arguments, names, list(d.f) + G.outputs, d.partials)
+        function("scalar_step", arguments, names, f, d.values)
+        + function("scalar_step_G", arguments, names, f + G.outputs, d.partials)
         + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
         + _inline(
             "substep_jacobian(t, h, x, R, p)",
@@ -205,11 +218,12 @@ def _sensor_source(model: Model) -> str:
         arguments += [f"s{i}" for i in range(len(d.own))]
         names |= {s: f"s{i}" for i, s in enumerate(d.own)}
         call += "".join(f", s[at + {i}]" for i in range(len(d.own)))
-        J = _Jacobian(d.H, "H")
+        called = [f"{component} of sensor {sensor.name}" for component in sensor.components]
+        h, J = list(zip(called, d.h, strict=True)), _Jacobian(d.H, "H", called)
         seen = [f"h{i}" for i in range(sensor.width)]
         functions += [
-            function(f"scalar_h{index}", arguments, names, list(d.h), d.values),
-            function(f"scalar_h{index}_H", arguments, names, list(d.h) + J.outputs, d.partials),
+            function(f"scalar_h{index}", arguments, names, h, d.values),
+            function(f"scalar_h{index}_H", arguments, names, h + J.outputs, d.partials),
         ]
         guard = f"if sensor == {index}:" if len(model.sensors) > 1 else "if True:"
         measure += [guard, "    " + _unpack(seen, f"scalar_h{index}({call})")]

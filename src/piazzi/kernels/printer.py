@@ -7,16 +7,21 @@ The source has no branches, so the same text serves floats and vector lanes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING, TypeVar
 
+from piazzi.expressions import patience
 from piazzi.expressions.functions import of_sympy
+from piazzi.expressions.patience import TooSlowError, each_patiently, patiently
 
 if TYPE_CHECKING:
     import sympy as sp
 
     from piazzi.model.derivation import Stage
 
+A = TypeVar("A")
+T = TypeVar("T")
 _SLOW = 4  # cycles of a root or a quotient, in multiplications
 
 
@@ -158,35 +163,80 @@ def function(
     name: str,
     arguments: Sequence[str],
     names: Mapping[sp.Symbol, str],
-    outputs: Sequence[sp.Expr],
+    outputs: Sequence[tuple[str, sp.Expr]],
     stages: Sequence[Stage] = (),
 ) -> str:
-    """Source of an inlined scalar function that returns the tuple of `outputs`.
+    """Source of an inlined scalar function that returns the tuple of `outputs`, each with what its equation is called.
 
     `names` gives each SymPy symbol its argument's name.  Stages are worked out first, in their order; common subexpressions are
     taken out of each by itself, so that the source and the time to make it grow with the number of stages.
+
+    Raises
+    ------
+    ValueError
+        Where SymPy takes more than 5 s for one equation.
     """
     writer = _Writer(names)
     for stage in stages:
-        for symbol, value in zip(stage.symbols, _without_common(writer, stage.values), strict=True):
-            writer.name(symbol, f"d{writer.defined}", value)
-            writer.defined += 1
-    results = [writer.text(e) for e in _without_common(writer, outputs)]
+        _define(writer, stage)
+    called, wanted = [what for what, _ in outputs], [e for _, e in outputs]
+    reduced = list(zip(called, _without_common(writer, called, wanted), strict=True))
+    rows = [(what, [e for _, e in row]) for what, row in groupby(reduced, key=lambda output: output[0])]
+    written = in_time(lambda i: rows[i][0], lambda row: [writer.text(e) for e in row[1]], rows)
+    results = [text for row in written for text in row]
     body = [*writer.lines, f"return ({', '.join(results)},)"]
     return f"@inline\ndef {name}({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in body) + "\n\n"
 
 
-def _without_common(writer: _Writer, expressions: Sequence[sp.Expr]) -> list[sp.Expr]:
-    """The expressions with their common parts written by `writer` and replaced by symbols."""
+def _define(writer: _Writer, stage: Stage) -> None:
+    """Write the values of a stage, the first of which is a definition, the others its derivatives."""
+    what = f"definition {stage.symbols[0]}"
+
+    def write(part: tuple[sp.Symbol, sp.Expr]) -> None:
+        writer.name(part[0], f"d{writer.defined}", part[1])
+        writer.defined += 1
+
+    values = _without_common(writer, [what] * len(stage.values), stage.values)
+    in_time(lambda _: what, write, list(zip(stage.symbols, values, strict=True)))
+
+
+def in_time(called: Callable[[int], str], write: Callable[[A], T], items: Sequence[A]) -> list[T]:
+    """What is written for each item; raises ValueError, with what the item is `called`, where SymPy takes too long for it."""
+    try:
+        return each_patiently(write, items)
+    except TooSlowError as error:
+        raise ValueError(f"code of {called(error.at)}: {error}") from None
+
+
+def _without_common(writer: _Writer, called: Sequence[str], expressions: Sequence[sp.Expr]) -> list[sp.Expr]:
+    """The expressions with their common parts written by `writer` and replaced by symbols; `called` names their equations."""
     import sympy as sp
 
-    shared, reduced = sp.cse(list(expressions), symbols=sp.numbered_symbols("c", cls=sp.Dummy))
+    equations = list(dict.fromkeys(called))
+    symbols = sp.numbered_symbols("c", cls=sp.Dummy)
+    try:
+        shared, reduced = patiently(lambda: sp.cse(list(expressions), symbols), patience.SECONDS * max(len(equations), 1))
+    except TooSlowError as error:
+        raise ValueError(f"code of {', '.join(equations)}: {error}") from None
     spread: dict[sp.Expr, sp.Expr] = {}
-    for temporary, value in shared:
+
+    def place(part: tuple[sp.Symbol, sp.Expr]) -> None:
+        temporary, value = part
         whole = value.xreplace(spread)
         if writer.is_late_product(whole):
             spread[temporary] = whole
         else:
             writer.name(temporary, f"c{writer.shared}", whole)
         writer.shared += 1
+
+    in_time(lambda i: _users(shared, i, called, reduced), place, shared)
     return [e.xreplace(spread) for e in reduced]
+
+
+def _users(shared: Sequence[tuple[sp.Symbol, sp.Expr]], at: int, called: Sequence[str], reduced: Sequence[sp.Expr]) -> str:
+    """The equations that the common part of this number is a part of."""
+    parts = {shared[at][0]}
+    for symbol, value in shared[at + 1 :]:
+        if value.free_symbols & parts:
+            parts.add(symbol)
+    return ", ".join(dict.fromkeys(what for what, e in zip(called, reduced, strict=True) if e.free_symbols & parts))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 from piazzi.expressions import symbol, to_sympy
-from piazzi.expressions.patience import TooSlowError, patiently
+from piazzi.expressions.patience import TooSlowError, each_patiently
 from piazzi.model.definitions import Definitions, needed
 from piazzi.model.naming import STEP, TIME
 from piazzi.model.sensor import Parameter, Sensor
@@ -179,13 +179,11 @@ def jacobian(f: sp.Matrix, x: Sequence[sp.Symbol]) -> sp.Matrix:
         real = f[i, :].replace(sp.Abs, Magnitude).replace(sp.sign, Sign)
         return real.jacobian(list(x)).replace(Magnitude, sp.Abs).replace(Sign, sp.sign)
 
-    entries: list[sp.Expr] = []
-    for i in range(f.rows):
-        try:
-            entries.extend(patiently(partial(row, i)))  # += asks the matrix of SymPy 1.13, which refuses
-        except TooSlowError as error:
-            raise ValueError(f"derivatives of equation {i + 1}: {error}") from None
-    return sp.Matrix(f.rows, len(x), entries)
+    try:
+        rows = each_patiently(row, range(f.rows))
+    except TooSlowError as error:
+        raise ValueError(f"derivatives of equation {error.at + 1}: {error}") from None
+    return sp.Matrix(f.rows, len(x), [entry for found in rows for entry in found])
 
 
 def constant_acceleration_step(model: Equations) -> tuple[tuple[sp.Expr, ...], sp.Symbol]:
