@@ -87,7 +87,7 @@ class _Jacobian:
     def __init__(self, matrix: sp.Matrix, prefix: str, called: Sequence[str]) -> None:
         self.matrix = matrix
         varying = [(i, j) for i in range(matrix.rows) for j in range(matrix.cols) if matrix[i, j].free_symbols]
-        self.outputs = [(called[i], matrix[i, j]) for i, j in varying]
+        self.outputs, self.called = [matrix[i, j] for i, j in varying], [called[i] for i, _ in varying]
         self.names = [f"{prefix}{i}_{j}" for i, j in varying]
         self._texts = dict(zip(varying, self.names, strict=True))
 
@@ -135,13 +135,13 @@ def _unpack(names: Sequence[str], call: str) -> str:
 def _dynamics_source(model: Model) -> str:
     d, (arguments, names, call) = derive(model), _arguments(model)
     nd, n, called = len(model.moving), model.n, _called(model)
-    f, F = list(zip(called, d.f, strict=True)), _Jacobian(d.F, "F", called)
+    F = _Jacobian(d.F, "F", called)
     rates = [f"f{i}" for i in range(nd)]
     whole = f"alike(x, {', '.join(rates + ['0.0'] * (n - nd))})"
     rows = ", ".join(F.row_times(i, _rows(model), n) for i in range(nd))
     return (
-        function("scalar_f", arguments, names, f, d.values)
-        + function("scalar_f_F", arguments, names, f + F.outputs, d.partials)
+        function("scalar_f", arguments, names, list(d.f), d.values, called)
+        + function("scalar_f_F", arguments, names, list(d.f) + F.outputs, d.partials, called + F.called)
         + _inline("dynamics(t, x, p)", _unpack(rates, f"scalar_f({call})"), f"return {whole}")
         + _inline("rhs(t, x, R, p)", _unpack(rates + F.names, f"scalar_f_F({call})"), f"return {whole}, matrix({rows})")
     )
@@ -165,7 +165,7 @@ def _constant_acceleration_source(model: Model) -> str:
     arguments, names, call = _arguments(model, ("h",))
     names = {**names, h: "h"}
     nd, n, called = len(model.moving), model.n, _called(model)
-    f, F, rows = list(zip(called, nxt, strict=True)), _Jacobian(d.F, "F", called), _rows(model)
+    F, rows = _Jacobian(d.F, "F", called), _rows(model)
     moving = list(d.x[:nd])
     rates = [moving.index(rate) if rate in moving else i for i, rate in enumerate(d.f)]  # the state whose rate counts
     results = [f"n{i}" for i in range(nd)]
@@ -175,8 +175,8 @@ def _constant_acceleration_source(model: Model) -> str:
     products += [f"V{j} = R[{j}] + h*K{j}" for j in used]
     new = [f"V{i}" if i == j else f"R[{i}] + half*(R[{j}] + V{j})" for i, j in enumerate(rates)]
     return (
-        function("scalar_step", arguments, names, f, d.values)
-        + function("scalar_step_F", arguments, names, f + F.outputs, d.partials)
+        function("scalar_step", arguments, names, list(nxt), d.values, called)
+        + function("scalar_step_F", arguments, names, list(nxt) + F.outputs, d.partials, called + F.called)
         + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
         + _inline(
             "substep_jacobian(t, h, x, R, p)",
@@ -193,13 +193,13 @@ def _map_source(model: Model) -> str:
     d, (arguments, names, call) = derive(model), _arguments(model, ("h",))
     names = {**names, d.dt: "h"}
     nd, n, called = len(model.moving), model.n, _called(model)
-    f, G = list(zip(called, d.f, strict=True)), _Jacobian(d.F, "G", called)
+    G = _Jacobian(d.F, "G", called)
     results = [f"n{i}" for i in range(nd)]
     whole = f"alike(x, {', '.join(results + [f'x[{i}]' for i in range(nd, n)])})"
     rows = ", ".join(G.row_times(i, _rows(model), n) for i in range(nd))
     return (
-        function("scalar_step", arguments, names, f, d.values)
-        + function("scalar_step_G", arguments, names, f + G.outputs, d.partials)
+        function("scalar_step", arguments, names, list(d.f), d.values, called)
+        + function("scalar_step_G", arguments, names, list(d.f) + G.outputs, d.partials, called + G.called)
         + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
         + _inline(
             "substep_jacobian(t, h, x, R, p)",
@@ -219,11 +219,11 @@ def _sensor_source(model: Model) -> str:
         names |= {s: f"s{i}" for i, s in enumerate(d.own)}
         call += "".join(f", s[at + {i}]" for i in range(len(d.own)))
         called = [f"{component} of sensor {sensor.name}" for component in sensor.components]
-        h, J = list(zip(called, d.h, strict=True)), _Jacobian(d.H, "H", called)
+        J = _Jacobian(d.H, "H", called)
         seen = [f"h{i}" for i in range(sensor.width)]
         functions += [
-            function(f"scalar_h{index}", arguments, names, h, d.values),
-            function(f"scalar_h{index}_H", arguments, names, h + J.outputs, d.partials),
+            function(f"scalar_h{index}", arguments, names, list(d.h), d.values, called),
+            function(f"scalar_h{index}_H", arguments, names, list(d.h) + J.outputs, d.partials, called + J.called),
         ]
         guard = f"if sensor == {index}:" if len(model.sensors) > 1 else "if True:"
         measure += [guard, "    " + _unpack(seen, f"scalar_h{index}({call})")]

@@ -163,10 +163,11 @@ def function(
     name: str,
     arguments: Sequence[str],
     names: Mapping[sp.Symbol, str],
-    outputs: Sequence[tuple[str, sp.Expr]],
+    outputs: Sequence[sp.Expr],
     stages: Sequence[Stage] = (),
+    called: Sequence[str] = (),
 ) -> str:
-    """Source of an inlined scalar function that returns the tuple of `outputs`, each with what its equation is called.
+    """Source of an inlined scalar function that returns the tuple of `outputs`; `called` names the equation of each.
 
     `names` gives each SymPy symbol its argument's name.  Stages are worked out first, in their order; common subexpressions are
     taken out of each by itself, so that the source and the time to make it grow with the number of stages.
@@ -179,8 +180,8 @@ def function(
     writer = _Writer(names)
     for stage in stages:
         _define(writer, stage)
-    called, wanted = [what for what, _ in outputs], [e for _, e in outputs]
-    reduced = list(zip(called, _without_common(writer, called, wanted), strict=True))
+    called = called or [name] * len(outputs)
+    reduced = list(zip(called, _without_common(writer, called, outputs), strict=True))
     rows = [(what, [e for _, e in row]) for what, row in groupby(reduced, key=lambda output: output[0])]
     written = in_time(lambda i: rows[i][0], lambda row: [writer.text(e) for e in row[1]], rows)
     results = [text for row in written for text in row]
