@@ -201,7 +201,7 @@ def test_code_that_takes_long_is_refused_with_its_equation(changes, place):
 
 
 def test_so_are_common_parts_that_take_long_to_find(monkeypatch):
-    monkeypatch.setattr(sp, "cse", lambda *arguments: spin())
+    monkeypatch.setattr(sp, "cse", lambda *arguments, **options: spin())
     with pytest.raises(ValueError, match=r"^code of the dynamics of x, the dynamics of v: SymPy needs more than 0.1 s"):
         source()
 

@@ -16,6 +16,7 @@ the factors of an update.  The functions:
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from piazzi.kernels.printer import function, in_time
@@ -90,13 +91,12 @@ class _Jacobian:
         self.outputs, self.called = [matrix[i, j] for i, j in varying], [called[i] for i, _ in varying]
         self.names = [f"{prefix}{i}_{j}" for i, j in varying]
         self._texts = dict(zip(varying, self.names, strict=True))
-
-        def write(i: int) -> None:
-            for j in range(matrix.cols):
-                if (i, j) not in self._texts and matrix[i, j] != 0:
-                    self._texts[i, j] = repr(float(matrix[i, j]))
-
-        in_time(called.__getitem__, write, range(matrix.rows))
+        literals = [ij for ij in product(range(matrix.rows), range(matrix.cols)) if ij not in self._texts and matrix[ij] != 0]
+        numbers = {ij: matrix[ij].is_Rational or matrix[ij].is_Float for ij in literals}
+        self._texts |= {ij: repr(float(matrix[ij])) for ij in literals if numbers[ij]}
+        slow = [ij for ij in literals if not numbers[ij]]
+        texts = in_time(lambda k: called[slow[k][0]], lambda ij: repr(float(matrix[ij])), slow)
+        self._texts |= dict(zip(slow, texts, strict=True))
 
     def entry(self, i: int, j: int) -> str:
         """Text of an entry, "" where it is zero."""

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from piazzi.model.derivation import Stage
 
+    Spread = dict[sp.Symbol, sp.Expr]
+
 A = TypeVar("A")
 T = TypeVar("T")
 _SLOW = 4  # cycles of a root or a quotient, in multiplications
@@ -177,61 +179,73 @@ def function(
     ValueError
         Where SymPy takes more than 5 s for one equation.
     """
-    writer = _Writer(names)
-    for stage in stages:
-        _define(writer, stage)
-    called = called or [name] * len(outputs)
-    reduced = list(zip(called, _without_common(writer, called, outputs), strict=True))
-    rows = [(what, [e for _, e in row]) for what, row in groupby(reduced, key=lambda output: output[0])]
-    written = in_time(lambda i: rows[i][0], lambda row: [writer.text(e) for e in row[1]], rows)
-    results = [text for row in written for text in row]
+    writer, called = _Writer(names), called or [name] * len(outputs)
+    in_time(lambda i: f"definition {stages[i].symbols[0]}", lambda stage: _define(writer, stage), stages)
+    results = _written(writer, outputs, called)
     body = [*writer.lines, f"return ({', '.join(results)},)"]
     return f"@inline\ndef {name}({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in body) + "\n\n"
-
-
-def _define(writer: _Writer, stage: Stage) -> None:
-    """Write the values of a stage, the first of which is a definition, the others its derivatives."""
-    what = f"definition {stage.symbols[0]}"
-
-    def write(part: tuple[sp.Symbol, sp.Expr]) -> None:
-        writer.name(part[0], f"d{writer.defined}", part[1])
-        writer.defined += 1
-
-    values = _without_common(writer, [what] * len(stage.values), stage.values)
-    in_time(lambda _: what, write, list(zip(stage.symbols, values, strict=True)))
 
 
 def in_time(called: Callable[[int], str], write: Callable[[A], T], items: Sequence[A]) -> list[T]:
     """What is written for each item; raises ValueError, with what the item is `called`, where SymPy takes too long for it."""
     try:
-        return each_patiently(write, items)
+        return each_patiently(write, items) if items else []
     except TooSlowError as error:
         raise ValueError(f"code of {called(error.at)}: {error}") from None
 
 
-def _without_common(writer: _Writer, called: Sequence[str], expressions: Sequence[sp.Expr]) -> list[sp.Expr]:
-    """The expressions with their common parts written by `writer` and replaced by symbols; `called` names their equations."""
-    import sympy as sp
+def _define(writer: _Writer, stage: Stage) -> None:
+    """Write a definition and its derivatives."""
+    shared, reduced = _common(stage.values)
+    spread: Spread = {}
+    for part in shared:
+        _place(writer, part, spread)
+    for symbol, value in zip(stage.symbols, reduced, strict=True):
+        writer.name(symbol, f"d{writer.defined}", value.xreplace(spread))
+        writer.defined += 1
 
+
+def _written(writer: _Writer, outputs: Sequence[sp.Expr], called: Sequence[str]) -> list[str]:
+    """Texts of the outputs, their common parts written before."""
     equations = list(dict.fromkeys(called))
-    symbols = sp.numbered_symbols("c", cls=sp.Dummy)
     try:
-        shared, reduced = patiently(lambda: sp.cse(list(expressions), symbols), patience.SECONDS * max(len(equations), 1))
+        shared, reduced = patiently(lambda: _common(outputs), patience.SECONDS * max(len(equations), 1))
     except TooSlowError as error:
         raise ValueError(f"code of {', '.join(equations)}: {error}") from None
-    spread: dict[sp.Expr, sp.Expr] = {}
+    rows = [[e for _, e in row] for _, row in groupby(zip(called, reduced, strict=True), key=lambda output: output[0])]
+    spread: Spread = {}
 
-    def place(part: tuple[sp.Symbol, sp.Expr]) -> None:
-        temporary, value = part
-        whole = value.xreplace(spread)
-        if writer.is_late_product(whole):
-            spread[temporary] = whole
-        else:
-            writer.name(temporary, f"c{writer.shared}", whole)
-        writer.shared += 1
+    def write(item: int) -> list[str]:
+        if item < len(shared):
+            _place(writer, shared[item], spread)
+            return []
+        return [writer.text(e.xreplace(spread)) for e in rows[item - len(shared)]]
 
-    in_time(lambda i: _users(shared, i, called, reduced), place, shared)
-    return [e.xreplace(spread) for e in reduced]
+    def told(item: int) -> str:
+        if item < len(shared):
+            return _users(shared, item, called, reduced)
+        return [what for what, _ in groupby(called)][item - len(shared)]
+
+    return [text for row in in_time(told, write, range(len(shared) + len(rows))) for text in row]
+
+
+def _common(expressions: Sequence[sp.Expr]) -> tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]:
+    """Common parts with symbols for them, and the expressions in terms of those."""
+    import sympy as sp
+
+    shared, reduced = sp.cse(list(expressions), symbols=sp.numbered_symbols("c", cls=sp.Dummy))
+    return shared, reduced
+
+
+def _place(writer: _Writer, part: tuple[sp.Symbol, sp.Expr], spread: Spread) -> None:
+    """Write a common part, or add it to those that are spread: multiplied anew wherever they are used."""
+    symbol, value = part
+    whole = value.xreplace(spread)
+    if writer.is_late_product(whole):
+        spread[symbol] = whole
+    else:
+        writer.name(symbol, f"c{writer.shared}", whole)
+    writer.shared += 1
 
 
 def _users(shared: Sequence[tuple[sp.Symbol, sp.Expr]], at: int, called: Sequence[str], reduced: Sequence[sp.Expr]) -> str:
