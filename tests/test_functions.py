@@ -10,8 +10,8 @@ import sympy as sp
 
 import piazzi as pz
 from piazzi.expressions import Equation, ExpressionError, added, check, evaluate, evaluate_arrays, from_sympy, symbol, to_sympy
-from piazzi.expressions.bounds import read
 from piazzi.expressions.functions import TABLE, Function, arities
+from piazzi.expressions.limits import read
 
 SWITCH = Function(
     "switch",

@@ -33,7 +33,11 @@ if TYPE_CHECKING:
     from piazzi.estimate.long_steps import step_warning
     from piazzi.estimate.prior import with_prior_at
     from piazzi.estimate.substeps import choose_substeps, substep_error
-    from piazzi.evaluate import Comparison, Observability, WindowTrade, compare, observability, windows
+    from piazzi.evaluate.comparison import Comparison, compare
+    from piazzi.evaluate.observable import Observability
+    from piazzi.evaluate.observing import observability
+    from piazzi.evaluate.window_lengths import windows
+    from piazzi.evaluate.window_trade import WindowTrade
     from piazzi.kernels import (
         ConstantAcceleration,
         Discrete,
@@ -67,103 +71,47 @@ if TYPE_CHECKING:
     from piazzi.simulation import simulate
     from piazzi.study import Study, read_store
 
-# name -> module; nothing is imported before it is used
+# Where a name is; nothing is imported before it is used
 _WHERE = {
-    **dict.fromkeys(("Model", "Parameter", "Sensor"), "piazzi.model"),
-    **dict.fromkeys(
-        ("ConstantAcceleration", "Discrete", "DormandPrince", "DormandPrince5", "Euler", "Heun", "Integrator", "Kepler"),
-        "piazzi.kernels",
-    ),
-    **dict.fromkeys(("Midpoint", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Taylor"), "piazzi.kernels"),
-    **dict.fromkeys(("Gaussian", "Manoeuvre", "Problem", "ProcessNoise", "Station", "Tracking", "Truth"), "piazzi.problem"),
-    "with_gauss_markov": "piazzi.problem",
-    **dict.fromkeys(
-        ("BatchLeastSquares", "Estimate", "ExtendedKalmanFilter", "FactorGraph", "LiveFilter", "LiveWindow"), "piazzi.estimate"
-    ),
-    **dict.fromkeys(("Prediction", "SlidingWindow", "Smoother", "Updated", "predict", "update"), "piazzi.estimate"),
-    **dict.fromkeys(("Forecast", "LiveRootFilter", "SquareRootKalmanFilter", "UnscentedKalmanFilter"), "piazzi.estimate"),
-    **dict.fromkeys(("Comparison", "Observability", "WindowTrade"), "piazzi.evaluate"),
-    **dict.fromkeys(("compare", "observability", "windows"), "piazzi.evaluate"),
-    **dict.fromkeys(("Bank", "Cauchy", "Huber", "Tukey"), "piazzi.estimate"),
-    **dict.fromkeys(("choose_substeps", "substep_error"), "piazzi.estimate.substeps"),
-    "step_warning": "piazzi.estimate.long_steps",
-    **dict.fromkeys(("kepler_transition", "propagate_kepler"), "piazzi.orbit"),
-    **dict.fromkeys(("Study", "read_store"), "piazzi.study"),
-    "with_prior_at": "piazzi.estimate.prior",
-    "simulate": "piazzi.simulation",
-    "load": "piazzi.loading",
-    "write_report": "piazzi.present.report",
-    "Epoch": "piazzi.earth",
-    "earth": "",  # a package of its own
+    name: module
+    for module, names in {
+        "piazzi.model": "Model Parameter Sensor",
+        "piazzi.kernels": "ConstantAcceleration Discrete DormandPrince DormandPrince5 Euler Heun Integrator Kepler Midpoint "
+        "Ralston RungeKutta RungeKutta4 RungeKutta8 Taylor",
+        "piazzi.earth": "Epoch",
+        "piazzi.problem": "Gaussian Manoeuvre Problem ProcessNoise Station Tracking Truth with_gauss_markov",
+        "piazzi.orbit": "kepler_transition propagate_kepler",
+        "piazzi.simulation": "simulate",
+        "piazzi.estimate": "Bank BatchLeastSquares Cauchy Estimate ExtendedKalmanFilter FactorGraph Forecast Huber LiveFilter "
+        "LiveRootFilter LiveWindow Prediction SlidingWindow Smoother SquareRootKalmanFilter Tukey UnscentedKalmanFilter "
+        "Updated predict update",
+        "piazzi.estimate.long_steps": "step_warning",
+        "piazzi.estimate.prior": "with_prior_at",
+        "piazzi.estimate.substeps": "choose_substeps substep_error",
+        "piazzi.loading": "load",
+        "piazzi.evaluate.comparison": "Comparison compare",
+        "piazzi.evaluate.observable": "Observability",
+        "piazzi.evaluate.observing": "observability",
+        "piazzi.evaluate.window_lengths": "windows",
+        "piazzi.evaluate.window_trade": "WindowTrade",
+        "piazzi.study": "Study read_store",
+        "piazzi.present.report": "write_report",
+        "": "earth",
+    }.items()
+    for name in names.split()
 }
 
 __version__ = "0.1.0"
 __all__ = [
-    "Bank",
-    "BatchLeastSquares",
-    "Cauchy",
-    "Comparison",
-    "ConstantAcceleration",
-    "Discrete",
-    "DormandPrince",
-    "DormandPrince5",
-    "Epoch",
-    "Estimate",
-    "Euler",
-    "ExtendedKalmanFilter",
-    "FactorGraph",
-    "Forecast",
-    "Gaussian",
-    "Heun",
-    "Huber",
-    "Integrator",
-    "Kepler",
-    "LiveFilter",
-    "LiveRootFilter",
-    "LiveWindow",
-    "Manoeuvre",
-    "Midpoint",
-    "Model",
-    "Observability",
-    "Parameter",
-    "Prediction",
-    "Problem",
-    "ProcessNoise",
-    "Ralston",
-    "RungeKutta",
-    "RungeKutta4",
-    "RungeKutta8",
-    "Sensor",
-    "SlidingWindow",
-    "Smoother",
-    "SquareRootKalmanFilter",
-    "Station",
-    "Study",
-    "Taylor",
-    "Tracking",
-    "Truth",
-    "Tukey",
-    "UnscentedKalmanFilter",
-    "Updated",
-    "WindowTrade",
-    "choose_substeps",
-    "compare",
-    "earth",
-    "kepler_transition",
-    "load",
-    "observability",
-    "predict",
-    "propagate_kepler",
-    "read_store",
-    "simulate",
-    "step_warning",
-    "substep_error",
-    "update",
-    "windows",
-    "with_gauss_markov",
-    "with_prior_at",
-    "write_report",
-]
+    "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Discrete", "DormandPrince",
+    "DormandPrince5", "Epoch", "Estimate", "Euler", "ExtendedKalmanFilter", "FactorGraph", "Forecast", "Gaussian", "Heun",
+    "Huber", "Integrator", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre", "Midpoint", "Model",
+    "Observability", "Parameter", "Prediction", "Problem", "ProcessNoise", "Ralston", "RungeKutta", "RungeKutta4",
+    "RungeKutta8", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station", "Study", "Taylor",
+    "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps", "compare", "earth",
+    "kepler_transition", "load", "observability", "predict", "propagate_kepler", "read_store", "simulate", "step_warning",
+    "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -46,7 +46,7 @@ def load(
     return problem, tracking
 
 
-def _from_prior_on(text: str, problem: Problem, tracking: Tracking) -> tuple[Problem, Tracking]:
+def _with_prior_before(text: str, problem: Problem, tracking: Tracking) -> tuple[Problem, Tracking]:
     """The same with the prior no later than the first measurement."""
     first = float(tracking.times[0])
     if problem.prior_time is None or problem.prior_time <= first:
@@ -70,14 +70,14 @@ def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None) -> tu
     if kind == ".nc":
         from piazzi.io.netcdf import read_netcdf
 
-        return _from_prior_on(text, *read_netcdf(text))
+        return _with_prior_before(text, *read_netcdf(text))
     if kind == ".csv":
         from piazzi.io.csv import read_csv
 
         if scenario is None:
             raise ValueError(f"{text}: name the scenario that this .csv file measures: {', '.join(names())}, or a path")
         problem = load_scenario(scenario).problem
-        return _from_prior_on(text, problem, read_csv(text, problem))
+        return _with_prior_before(text, problem, read_csv(text, problem))
     if kind != ".toml" and os.path.isfile(text):
         raise ValueError(f"{text}: files end in {', '.join(KINDS)}, not {kind!r}")
     found = load_scenario(text)

@@ -15,12 +15,12 @@ def printable(text: str) -> str:
     return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
-def unformulated(text: str) -> str:
+def escape_formula(text: str) -> str:
     """The text as a cell that no spreadsheet takes for a formula: behind an apostrophe where it would; see `restored`."""
     return f"'{text}" if _FORMULA.match(text) else text
 
 
-def restored(cell: str) -> str:
+def unescape_formula(cell: str) -> str:
     """The text of which `unformulated` made this cell; any other cell as it is."""
     return cell[1:] if _GUARDED.match(cell) else cell
 

@@ -321,7 +321,7 @@ def test_an_interruption_in_the_middle_of_a_line_loses_no_line(rows, measurement
     assert call("estimate", "b612-range", "--follow", rows, "-o", whole).status == 0
     command = ("estimate", "b612-range", "--follow", rows, "-o", out, "--checkpoint", state)
     monkeypatch.setattr("piazzi.cli.follow.BETWEEN_CHECKPOINTS", 0.0)
-    for place in ("piazzi.io.rows.RowReader.read", "piazzi.estimate.live.LiveFilter.update", "piazzi.cli.sink.Sink.emit"):
+    for place in ("piazzi.io.lines.RowReader.read", "piazzi.estimate.live.LiveFilter.update", "piazzi.cli.sink.Sink.emit"):
         for at in (3, 17):
             out.unlink(missing_ok=True)
             state.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Tests of honesty on arrays, against brute force and textbook formulas."""
+"""Tests of consistency on arrays, against brute force and textbook formulas."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from piazzi.evaluate.consistency import (
     paired,
     whiteness_check,
 )
-from piazzi.evaluate.honesty import standardized
+from piazzi.evaluate.consistency_tests import standardized
 from piazzi.evaluate.metrics import convergence_time
 from tests.references.chi_square import mean_bounds
 

@@ -11,8 +11,8 @@ import pytest
 import piazzi as pz
 from piazzi.estimate import Estimate
 from piazzi.evaluate import Comparison, compare, evaluate, posterior_bounds
+from piazzi.evaluate.comparison_table import columns, sentences
 from piazzi.evaluate.consistency import Check
-from piazzi.evaluate.display import columns, sentences
 from piazzi.evaluate.quantities import ideal
 from piazzi.present.report.words import points
 from piazzi.present.squares import nees_of
@@ -206,17 +206,17 @@ def test_bounds_and_tests_stand_beside_errors(good):
     bounds = posterior_bounds(good.problem, good.tracking)
     assert row.crlb["position"] == pytest.approx(np.sqrt(np.trace(bounds.realtime, axis1=1, axis2=2).mean()))
     assert row.crlb_last_half["position"] == pytest.approx(np.sqrt(np.trace(bounds.realtime[20:], axis1=1, axis2=2).mean()))
-    assert row.honesty.nis.statistic == pytest.approx(row.mean_nis)
-    assert row.honesty.nees_last_half.statistic == pytest.approx(row.mean_nees_last_half)
+    assert row.tests.nis.statistic == pytest.approx(row.mean_nis)
+    assert row.tests.nees_last_half.statistic == pytest.approx(row.mean_nees_last_half)
     quick = compare(good.problem, good.tracking, {"good": Ready(good)}, thorough=False).rows[0]
-    assert (quick.crlb, quick.honesty.nis) == ({}, None)
+    assert (quick.crlb, quick.tests.nis) == ({}, None)
     assert quick.rmse == row.rmse
 
 
 def test_tests_that_fail_are_named(good):
     comparison = compared(good=good, loud=replace(good, innovations=3 * good.innovations))
-    assert comparison.rows[0].honesty.nis.passed
-    assert not comparison.rows[1].honesty.nis.passed
+    assert comparison.rows[0].tests.nis.passed
+    assert not comparison.rows[1].tests.nis.passed
     text = rendered(comparison, 250)
     assert re.search(r"^loud .* NIS ", text, re.M)
     assert re.search(r"loud fails the .*NIS.* tests? \(5 % level\)", text)
@@ -231,9 +231,9 @@ def test_dataset_has_every_number_with_its_unit(good):
 
 
 def test_many_epochs_do_without_the_bound(good, monkeypatch):
-    whole = compared(good=good).rows[0].honesty
+    whole = compared(good=good).rows[0].tests
     monkeypatch.setattr("piazzi.evaluate.comparison.LONGEST", 40)
-    monkeypatch.setattr("piazzi.evaluate.honesty.LONGEST", 40)
+    monkeypatch.setattr("piazzi.evaluate.consistency_tests.LONGEST", 40)
     (row,) = strict(compared(good=good).to_json())["rows"]
     assert row["position_rmse"] > 0
     assert row["position_crlb"] is None
@@ -401,7 +401,7 @@ def test_a_test_decides_where_there_is_one(good):
     row = compared(ekf=replace(good, mean=2 * good.mean)).rows[0]
     size = row.mean_nees_last_half
     for high, word in ((2 * size, "consistent with the covariance"), (0.9 * size, "what the covariance predicts")):
-        judged = replace(row, honesty=replace(row.honesty, nees_last_half=Check(size, 0.0, high, 5.0)))
+        judged = replace(row, tests=replace(row.tests, nees_last_half=Check(size, 0.0, high, 5.0)))
         comparison = replace(compared(ekf=good), rows=(judged,))
         assert word in str(comparison)
         assert any(word in p.text for p in points(comparison))

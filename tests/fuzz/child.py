@@ -51,7 +51,7 @@ def warm() -> None:
     import piazzi.io.csv
     import piazzi.io.netcdf
     import piazzi.kernels.plain
-    import piazzi.present.studies
+    import piazzi.present.study_table
     import piazzi.study.store
     from piazzi.cli import commands
 

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import piazzi as pz
 from piazzi.io import cells, save
 from piazzi.io.csv import read_csv, write_csv
-from piazzi.text import restored, unformulated
+from piazzi.text import escape_formula, unescape_formula
 from tests.references.drawn import FLOATS, TEXT, problems, same_bits, same_tracking, trackings
 
 QUIET = settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
@@ -344,10 +344,10 @@ def test_no_station_is_a_formula_and_all_are_read_back(tmp_path):
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_what_is_written_for_spreadsheets_is_undone(name):
-    assert restored(unformulated(name)) == name
-    assert unformulated(name)[:1] not in ("=", "+", "-", "@", "\t", "\r")
+    assert unescape_formula(escape_formula(name)) == name
+    assert escape_formula(name)[:1] not in ("=", "+", "-", "@", "\t", "\r")
 
 
 @given(st.text(alphabet="'=+-@\t\rab1", max_size=6))
 def test_cells_of_different_names_differ(name):
-    assert restored(unformulated(name)) == name
+    assert unescape_formula(escape_formula(name)) == name

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from piazzi.io.rows import RowReader
+from piazzi.io.lines import RowReader
 from tests.io.test_csv import ALONE, GOOD, PROBLEM, read
 
 

@@ -9,7 +9,10 @@ from matplotlib.patches import Circle, Ellipse
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.evaluate import Comparison, WindowTrade, compare, observability, windows
+from piazzi.evaluate import Comparison, compare
+from piazzi.evaluate.observing import observability
+from piazzi.evaluate.window_lengths import windows
+from piazzi.evaluate.window_trade import WindowTrade
 from piazzi.present.figures import (
     bound_sigmas,
     error_overlay,
@@ -29,8 +32,8 @@ from piazzi.present.figures import (
     window_trade,
 )
 from piazzi.present.figures.errors import claim_overlay
+from piazzi.present.figures.measured import residuals_of
 from piazzi.present.figures.pages import pages, save
-from piazzi.present.figures.residuals import residuals_of
 from piazzi.present.figures.style import COLOURS, MOST_POINTS, colour_of, drawn, line_of
 from piazzi.scenarios import load_scenario
 

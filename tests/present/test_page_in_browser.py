@@ -8,8 +8,10 @@ import pytest
 
 import piazzi as pz
 from piazzi.estimate.registry import parse
-from piazzi.evaluate import Comparison, compare, observability, windows
+from piazzi.evaluate import Comparison, compare
+from piazzi.evaluate.observing import observability
 from piazzi.evaluate.quantities import number
+from piazzi.evaluate.window_lengths import windows
 from piazzi.present.colours import shade_of
 from piazzi.present.report import comparison_tab, observability_tab, windows_tab, write_page
 from piazzi.scenarios import load_scenario

@@ -14,11 +14,12 @@ from numpy.testing import assert_allclose
 import piazzi as pz
 from piazzi.evaluate import Comparison, compare
 from piazzi.evaluate.consistency import Check
-from piazzi.evaluate.honesty import Honesty
+from piazzi.evaluate.consistency_tests import ConsistencyTests
 from piazzi.present.colours import COLOURS, mixed, shade_of, shades
-from piazzi.present.report import Key, Section, Tab, Table, Text, comparison_tab, page, write_page
-from piazzi.present.report.encode import Pool, packed, script_json
-from piazzi.present.report.thinning import MOST_POINTS, Thinning
+from piazzi.present.report import Key, Section, Tab, comparison_tab, page, write_page
+from piazzi.present.report.blocks import Table, Text
+from piazzi.present.report.html import Pool, packed, script_json
+from piazzi.present.report.views import MOST_POINTS, Thinning
 from piazzi.present.report.words import listed, points
 from piazzi.present.squares import running_mean
 from piazzi.scenarios import load_scenario
@@ -255,10 +256,10 @@ def test_who_is_not_to_be_trusted_is_named_with_the_reason(comparison):
 def with_nees(row, value: float, low: float = 3.0, high: float = 5.0):
     """The row with this mean NEES, tested against these bounds."""
     check = Check(value, low, high, 100.0)
-    return replace(row, mean_nees=value, mean_nees_last_half=value, honesty=Honesty(nees=check, nees_last_half=check))
+    return replace(row, mean_nees=value, mean_nees_last_half=value, tests=ConsistencyTests(nees=check, nees_last_half=check))
 
 
-def test_honesty_is_judged_by_the_tests_where_there_are_any(comparison):
+def test_consistency_is_judged_by_the_tests_where_there_are_any(comparison):
     fair = [with_nees(r, 4.0) for r in comparison.rows]
     assert said(replace(comparison, rows=tuple(fair)))["Consistent covariance"].startswith("Errors of all are consistent with")
     sure = said(replace(comparison, rows=(with_nees(fair[0], 36.0), *fair[1:])))
@@ -269,15 +270,15 @@ def test_honesty_is_judged_by_the_tests_where_there_are_any(comparison):
     assert "Optimistic covariance" not in said(replace(comparison, rows=(wide, *fair[1:])))
 
 
-def test_honesty_is_judged_by_a_factor_without_tests(comparison):
-    rows = [replace(with_nees(r, 4.0), honesty=Honesty()) for r in comparison.rows]
-    rows[0] = replace(with_nees(rows[0], 36.0), honesty=Honesty())
+def test_consistency_is_judged_by_a_factor_without_tests(comparison):
+    rows = [replace(with_nees(r, 4.0), tests=ConsistencyTests()) for r in comparison.rows]
+    rows[0] = replace(with_nees(rows[0], 36.0), tests=ConsistencyTests())
     assert "Errors of ekf are about 3.0" in said(replace(comparison, rows=tuple(rows)))["Optimistic covariance"]
 
 
 def test_innovations_that_are_not_noise_are_told(comparison):
     rows = [with_nees(r, 4.0) for r in comparison.rows]
-    odd = replace(rows[0], honesty=replace(rows[0].honesty, whiteness=Check(99.0, 0.0, 18.3, 10), bias=Check(9.0, 0.0, 3.8, 1)))
+    odd = replace(rows[0], tests=replace(rows[0].tests, whiteness=Check(99.0, 0.0, 18.3, 10), bias=Check(9.0, 0.0, 3.8, 1)))
     text = said(replace(comparison, rows=(odd, *rows[1:])))["Innovations are not white noise"]
     assert "those of ekf are correlated in time and have a mean other than zero" in text
     assert "Innovations are not white noise" not in said(replace(comparison, rows=tuple(rows)))

@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from piazzi.expressions import patience
+from piazzi.expressions import time_limit
 from piazzi.scenarios import ScenarioError, check, load_scenario, show
-from piazzi.scenarios.faults import Faults
-from piazzi.scenarios.loader import MAX_BYTES
-from piazzi.scenarios.read import read_scenario
+from piazzi.scenarios.loader import MAX_BYTES, read_scenario
+from piazzi.scenarios.table import Faults
 
 GOOD = """
 [states]
@@ -278,7 +277,7 @@ def test_equations_that_keep_sympy_busy_are_found(tmp_path, monkeypatch):
     text, path = show("b612-range"), tmp_path / "slow.toml"
     assert "sqrt((x - mx)**2" in text
     path.write_text(text.replace("sqrt((x - mx)**2", f"{slow} + sqrt((x - mx)**2"))
-    monkeypatch.setattr(patience, "SECONDS", 0.3)
+    monkeypatch.setattr(time_limit, "SECONDS", 0.3)
     (fault,) = check(path)
     assert fault.path == "sensors.range"
     assert "SymPy needs more than 0.3 s for this" in fault.message

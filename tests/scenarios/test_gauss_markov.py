@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi.scenarios import show
-from piazzi.scenarios.faults import Faults
-from piazzi.scenarios.read import read_scenario
+from piazzi.scenarios.loader import read_scenario
+from piazzi.scenarios.table import Faults
 
 TEMPLATE = show().replace('units = "m, rad, s, kg"', 'units = "km, rad, min"')
 SECTION = "[gauss_markov]\nsigma = 0.6\ntime_constant = 5.0\n"

@@ -7,9 +7,8 @@ import pytest
 import piazzi as pz
 from piazzi import kernels
 from piazzi.kernels.integrators import Integrator
-from piazzi.scenarios.faults import Faults
-from piazzi.scenarios.integrators import INTEGRATORS, read_integrator, write_integrator
-from piazzi.scenarios.table import Table
+from piazzi.scenarios.motion import INTEGRATORS, read_integrator, write_integrator
+from piazzi.scenarios.table import Faults, Table
 from piazzi.units import Units
 
 OPTIONS = {"runge-kutta": {"a": [[], [0.5]], "b": [0.0, 1.0]}}

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from piazzi.scenarios import show
-from piazzi.scenarios.faults import Faults
-from piazzi.scenarios.read import read_scenario
+from piazzi.scenarios.loader import read_scenario
+from piazzi.scenarios.table import Faults
 
 
 def read(text, units="km, min"):

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from piazzi.scenarios.faults import Faults
-from piazzi.scenarios.table import Table
-from piazzi.scenarios.times import read_times
+from piazzi.scenarios.scenario import read_times
+from piazzi.scenarios.table import Faults, Table
 from piazzi.units import Units
 
 

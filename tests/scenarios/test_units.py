@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from piazzi.scenarios import show
-from piazzi.scenarios.faults import Faults
-from piazzi.scenarios.read import read_scenario
+from piazzi.scenarios.loader import read_scenario
+from piazzi.scenarios.table import Faults
 from piazzi.units import DIMENSIONS, TABLE, Units
 
 MIXED = """

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
 from piazzi.simulation import Rule, true_problem
-from piazzi.study.draws import MEASUREMENT, PRIOR, PROCESS, child, draw, first_states
+from piazzi.study.runs import MEASUREMENT, PRIOR, PROCESS, child, draw, first_states
 from tests.laws.problems import b612, satellite
 from tests.study.studies import drawn_truth
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from piazzi.present.studies import failures
+from piazzi.present.study_table import failures
 from piazzi.study import execute, pieces, pool, read_store, run_study, same_results, versions
 from piazzi.study.log import Log
 from piazzi.study.pool import Processes
@@ -342,8 +342,8 @@ def test_pieces_that_the_study_does_not_keep_are_computed_again(whole, tmp_path,
 def test_a_bound_that_is_not_known_is_gone_on_with(whole, tmp_path):
     study, _ = whole
     log = Log.create(tmp_path / "s.nc.runs", study.specification | {"versions": fingerprint()})
-    log.append(pieces.lost(study, Task(0, 0, 0), "why"))
-    log.append(pieces.lost(study, Task(0, 3, 2), "why not"))
+    log.append(pieces.failed_piece(study, Task(0, 0, 0), "why"))
+    log.append(pieces.failed_piece(study, Task(0, 3, 2), "why not"))
     log.close()
     told = run_study(study, tmp_path / "s.nc", workers=0, resume=True).about
     assert told["bounds_unknown"] == [[0, "why"]]

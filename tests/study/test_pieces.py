@@ -24,7 +24,7 @@ def assert_equals_compare(study, piece, runs):
     """Every number of a piece against `evaluate` of the same estimators on the same tracking."""
     for i, run in enumerate(piece.task.runs):
         for label, estimator in study.variants.items():
-            estimate = estimator.estimate(runs.belief, runs.tracking(i))
+            estimate = estimator.estimate(runs.assumed, runs.tracking(i))
             for found in (e for e in (estimate, estimate.delayed) if e is not None):
                 row, r = evaluate(label, found), study.rows.index((label, found.view))
                 numbers = {name: piece.arrays[name][r, i] for name in NUMBERS}
@@ -129,7 +129,7 @@ def test_mismatch_is_between_what_happens_and_what_is_believed():
     runs = simulated(study, Task(0, 0, 24))
     error = runs.z[:, :, 0] - np.array([study.problem.measure("radar", x, study.times)[:, 0] for x in runs.truth])
     assert error.std() == pytest.approx(10 * 0.1, rel=0.1)
-    assert runs.belief.stations[0].noise[0, 0] == 0.01
+    assert runs.assumed.stations[0].noise[0, 0] == 0.01
     piece = run_task(study, Task(0, 0, 24))
     assert piece.arrays["mean_nis"][0].mean() > 20
 

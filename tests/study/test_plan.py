@@ -8,7 +8,7 @@ from numpy.testing import assert_array_equal
 
 import piazzi as pz
 from piazzi.study import Study
-from piazzi.study.axes import problems_at
+from piazzi.study.variations import problems_at
 from tests.laws.problems import b612, satellite
 from tests.study.studies import small
 
@@ -34,15 +34,15 @@ def test_rows_have_every_view():
 
 
 @pytest.mark.parametrize(
-    ("axis", "world", "belief"),
+    ("axis", "world", "assumed"),
     [("R.scale", 4, 4), ("assumed.R.scale", 1, 4), ("truth.R.scale", 4, 1), ("R.earth.scale", 4, 4)],
 )
-def test_scopes(axis, world, belief):
+def test_scopes(axis, world, assumed):
     problem = satellite()
     study = Study(problem, np.arange(9) * 15.0, ["ekf"], vary={axis: [4]})
     R = problem.stations[0].noise
     assert_array_equal(study.problems(0)[0].stations[0].noise, world * R)
-    assert_array_equal(study.problems(0)[1].stations[0].noise, belief * R)
+    assert_array_equal(study.problems(0)[1].stations[0].noise, assumed * R)
 
 
 def test_what_happens_keeps_its_own_noise_and_parameters_in_step():
@@ -135,8 +135,8 @@ def test_study_of_a_scenario_follows_it_unless_told_otherwise():
 
 def test_values_are_put_in_whatever_the_order_of_axes():
     study = small(vary={"assumed.mu": [900.0], "truth.mu": [1100.0]})
-    world, belief = problems_at(study.problem, study.axes, (900.0, 1100.0))
-    assert (world.parameters["mu"], belief.parameters["mu"]) == (1100.0, 900.0)
+    world, assumed = problems_at(study.problem, study.axes, (900.0, 1100.0))
+    assert (world.parameters["mu"], assumed.parameters["mu"]) == (1100.0, 900.0)
 
 
 def test_windows_that_differ_in_more_than_their_length_keep_their_names():

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from piazzi.study.log import Log
-from piazzi.study.pieces import lost
+from piazzi.study.pieces import failed_piece
 from piazzi.study.pool import Outcome
 from piazzi.study.runner import MOST_DEATHS, RETRIES, Runner, missing
 from piazzi.study.tasks import Task
@@ -36,7 +36,7 @@ class Fake:
                 return [Outcome(task, died="SIGKILL")]
         if self.always:
             return [Outcome(task, error="MemoryError: no")]
-        return [Outcome(task, lost(self.study, task, "fine"))]
+        return [Outcome(task, failed_piece(self.study, task, "fine"))]
 
     def close(self):
         pass
@@ -77,7 +77,7 @@ def test_gaps_are_what_the_log_has_not(tmp_path):
     study = small(runs=20, vary={"R.scale": [1, 2]})
     log = Log.create(tmp_path / "s.runs", study.specification)
     for task in (Task(0, 5, 3), Task(0, 0, 2), Task(1, 0, 20), Task(1, 0, 0)):
-        log.append(lost(study, task, ""))
+        log.append(failed_piece(study, task, ""))
     assert list(missing(study, log)) == [Task(0, 2, 3), Task(0, 0, 0), Task(0, 8, 12)]
     log.close()
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.present.studies import columns
+from piazzi.present.study_table import columns
 from piazzi.study import run_study
 from piazzi.study.store import read_store
 from piazzi.study.summary import QUANTILES, wilson
@@ -42,8 +42,8 @@ def test_numbers_over_runs(stored):
     bound, bound_last_half, count = stored.bound(0, "realtime")
     assert count == 50
     assert line.over_bound["position"] == pytest.approx(np.sqrt(np.mean(half**2)) / bound_last_half[0])
-    assert_allclose(line.course.bound, bound)
-    assert_allclose(line.course.rms, np.sqrt((row.error.astype(float) ** 2).mean(axis=0)))
+    assert_allclose(line.history.bound, bound)
+    assert_allclose(line.history.rms, np.sqrt((row.error.astype(float) ** 2).mean(axis=0)))
     assert line.mean_nees == pytest.approx(row.numbers["mean_nees"].mean())
     assert line.seconds > 0
 
@@ -52,35 +52,35 @@ def test_failed_runs_are_counted_and_left_out(stored):
     line, row = stored.summary.lines[3], stored.row(0, 3)
     assert line.failed == (~row.success).sum() > 0
     assert line.mean_nis == pytest.approx(row.numbers["mean_nis"][row.success].mean())
-    assert np.isfinite(line.course.rms).all()
+    assert np.isfinite(line.history.rms).all()
 
 
 def test_bounds_of_mean_nees_hold_for_gaussian_errors():
     """99 % of means of M chi-square variables of n degrees of freedom."""
-    from piazzi.study.summary import Row, _course
+    from piazzi.study.summary import Row, _history
 
     rng = np.random.default_rng(0)
     M, T, n = 40, 4000, 4
     nees = rng.chisquare(n, (M, T))
     row = Row({}, np.ones(M, bool), np.zeros(M, bool), np.ones((M, T, 1)), nees, np.full((M, T), n))
-    inside = _course(row, np.ones((T, 1))).inside
+    inside = _history(row, np.ones((T, 1))).inside
     assert inside == pytest.approx(0.99, abs=5 * np.sqrt(0.99 * 0.01 / T))
 
 
 def test_bounds_of_mean_nees_hold_for_ranks_that_differ():
     """From run to run and from epoch to epoch; where there is no direction, there is no NEES."""
-    from piazzi.study.summary import Row, _course
+    from piazzi.study.summary import Row, _history
 
     rng = np.random.default_rng(1)
     M, T = 10, 4000
     rank = rng.integers(0, 4, (M, T))
     rank[:, 0] = 0
     nees = np.where(rank > 0, rng.chisquare(np.maximum(rank, 1)), np.nan)
-    course = _course(Row({}, np.ones(M, bool), np.zeros(M, bool), np.ones((M, T, 1)), nees, rank), np.ones((T, 1)))
-    assert course.inside == pytest.approx(0.99, abs=5 * np.sqrt(0.99 * 0.01 / T))
-    assert np.isnan(course.nees[0])
-    assert course.ideal == pytest.approx(2.0, abs=0.05)
-    assert course.band is None
+    history = _history(Row({}, np.ones(M, bool), np.zeros(M, bool), np.ones((M, T, 1)), nees, rank), np.ones((T, 1)))
+    assert history.inside == pytest.approx(0.99, abs=5 * np.sqrt(0.99 * 0.01 / T))
+    assert np.isnan(history.nees[0])
+    assert history.ideal == pytest.approx(2.0, abs=0.05)
+    assert history.band is None
 
 
 @pytest.mark.parametrize("rank", [2, 3])
@@ -91,10 +91,10 @@ def test_a_singular_covariance_is_judged_by_its_rank(tmp_path, rank):
     stored = run_study(small(runs=40, problem=problem, estimators=("ekf", "smoother"), epochs=20), tmp_path / "s.nc", workers=0)
     low, high = mean_bounds(rank, 40, 0.01)
     for line in stored.summary.lines:
-        assert line.course.ideal == rank
-        assert line.course.band == pytest.approx((low, high), rel=0.01)
+        assert line.history.ideal == rank
+        assert line.history.band == pytest.approx((low, high), rel=0.01)
         assert low < line.mean_nees < high
-        assert line.course.inside > 0.9
+        assert line.history.inside > 0.9
     assert next(c.unit for c in columns(stored.summary) if c.title == "mean NEES") == f"ideal {rank}"
     document = json.loads(json.dumps(stored.summary.to_dict(), allow_nan=False))
     assert document["rows"][0]["nees_bounds"] == pytest.approx([low, high], rel=0.01)

@@ -12,7 +12,7 @@ from piazzi.problem import Station
 from piazzi.text import nearest
 
 if TYPE_CHECKING:
-    from piazzi.evaluate.observe import Addition
+    from piazzi.evaluate.observing import Addition
     from piazzi.problem import Problem
 
 SYNTAX = "STATION, SENSOR:NUMBERS,sigma=S or NAME=EQUATION:NUMBERS,sigma=S[,angle]"

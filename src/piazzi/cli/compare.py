@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from piazzi.cli import options, reporting
-from piazzi.cli.ending import Ending
+from piazzi.cli import options, results
 
 if TYPE_CHECKING:
     from piazzi.evaluate import Comparison
@@ -23,7 +22,7 @@ DEFAULT = ("ekf", "graph", "window:100")
 @options.as_json
 @options.seed
 @options.scenario
-@reporting.option
+@results.report_option
 def command(
     source: str,
     names: tuple[str, ...],
@@ -45,20 +44,20 @@ def command(
       piazzi compare b612-range-q0 --seed 7
       piazzi compare tracking.npz --report out
     """
-    ending = Ending(output_file, as_json, report)
-    ending.check()
+    outputs = results.Outputs(output_file, as_json, report)
+    outputs.check()
     estimators = options.parsed(names, DEFAULT)
-    from piazzi.cli.comparing import run_comparison
+    from piazzi.cli.sources import run_comparison
 
     source_name, comparison, warning = run_comparison(source, estimators, seed, scenario, bar=report is not None)
 
     def tab() -> Tab:
         from piazzi.present.report import comparison_tab
 
-        title, planet_radius = reporting.titled(source, source_name, scenario)
+        title, planet_radius = results.title_and_planet(source, source_name, scenario)
         return comparison_tab(comparison, title=title, planet_radius=planet_radius, warning=warning)
 
-    return ending.give(comparison, lambda: rows(comparison), tab)
+    return outputs.write(comparison, lambda: rows(comparison), tab)
 
 
 def rows(comparison: Comparison) -> list[dict[str, Any]]:

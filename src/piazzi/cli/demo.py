@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from piazzi.cli import options, output, reporting
+from piazzi.cli import options, output, results
 from piazzi.cli.compare import DEFAULT
 from piazzi.cli.running import DONE, NOT_ESTIMATED
 
@@ -47,17 +47,17 @@ def command(folder: str, kind: str, seed: int) -> int:
     for name in PROBLEMS:
         scenario = load_scenario(name)
         with output.progress(len(DEFAULT) + PICTURES) as step:
-            comparison = _estimated(scenario, seed, step)
-            wrote += _drawn(comparison, scenario, target / name, kind, step)
-        wrote += _kept(comparison, target / name)
+            comparison = _compared(scenario, seed, step)
+            wrote += _write_pictures(comparison, scenario, target / name, kind, step)
+        wrote += _write_data(comparison, target / name)
         tabs.append(comparison_tab(comparison, title=scenario.title, planet_radius=scenario.picture.planet_radius))
         success &= comparison.success
         _print(comparison, scenario)
-    _conclude([*wrote, reporting.write(str(target), tabs)], target)
+    _print_next_steps([*wrote, results.write_page(str(target), tabs)], target)
     return DONE if success else NOT_ESTIMATED
 
 
-def _estimated(scenario: Scenario, seed: int, step: Callable[[str], None]) -> Comparison:
+def _compared(scenario: Scenario, seed: int, step: Callable[[str], None]) -> Comparison:
     import numpy as np
 
     from piazzi.estimate.registry import parse
@@ -73,7 +73,9 @@ def _estimated(scenario: Scenario, seed: int, step: Callable[[str], None]) -> Co
     return compare(scenario.problem, tracking, estimators, source=scenario.name, announce=announce)
 
 
-def _drawn(comparison: Comparison, scenario: Scenario, folder: Path, kind: str, step: Callable[[str], None]) -> list[Path]:
+def _write_pictures(
+    comparison: Comparison, scenario: Scenario, folder: Path, kind: str, step: Callable[[str], None]
+) -> list[Path]:
     from piazzi.present.figures.pages import pages, save
 
     out = []
@@ -83,7 +85,7 @@ def _drawn(comparison: Comparison, scenario: Scenario, folder: Path, kind: str, 
     return out
 
 
-def _kept(comparison: Comparison, folder: Path) -> list[Path]:
+def _write_data(comparison: Comparison, folder: Path) -> list[Path]:
     """Write the rows and the measurements; returns the paths."""
     from piazzi.io import save
 
@@ -102,7 +104,7 @@ def _print(comparison: Comparison, scenario: Scenario) -> None:
     output.print_rich(head, heading(comparison.problem, comparison.tracking, scenario.name), "", comparison, "")
 
 
-def _conclude(wrote: list[Path], folder: Path) -> None:
+def _print_next_steps(wrote: list[Path], folder: Path) -> None:
     """Say what was written, and what to type next."""
     lines = [f"Wrote {len(wrote)} files in {folder}:", f"  {folder}: {wrote[-1].name}"]
     for name in PROBLEMS:

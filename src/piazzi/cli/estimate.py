@@ -71,7 +71,7 @@ def command(
         from piazzi.cli.ahead import times_ahead
 
         times_ahead(ahead, 0.0)  # what cannot be read is told before anything is computed
-    from piazzi.cli.comparing import run_comparison
+    from piazzi.cli.sources import run_comparison
 
     source_name, comparison, _ = run_comparison(source, estimators, seed, scenario, thorough=False)
     forecasts = {} if ahead is None else predicted(comparison, ahead)
@@ -153,8 +153,8 @@ def prediction(forecast: Forecast) -> dict[str, Any]:
         return [listed(v) for v in values] if isinstance(values, list) else finite(values)
 
     names = ("times", "mean", "sigma", "growth", "covariance")
-    told = {"success": forecast.success, "message": forecast.message}
-    return told | {name: listed(getattr(forecast, name).tolist()) for name in names}
+    out = {"success": forecast.success, "message": forecast.message}
+    return out | {name: listed(getattr(forecast, name).tolist()) for name in names}
 
 
 def write(path: str, comparison: Comparison, document: dict[str, Any]) -> None:

@@ -21,7 +21,7 @@ from piazzi.cli.sink import Sink
 from piazzi.cli.sources import STDIN
 
 if TYPE_CHECKING:
-    from piazzi.io.rows import Row, RowReader
+    from piazzi.io.lines import Row, RowReader
     from piazzi.problem import Problem
 
 BETWEEN_CHECKPOINTS = 0.05  # seconds: the file is synced to disk each time
@@ -133,7 +133,7 @@ class _Run:
             self.consumed.update(line)
             empty = not line.strip() or line.startswith(b"#")
             if not empty:
-                self._recognise(line)
+                self._match_checkpoint(line)
             known = self._known()
             if not empty:
                 self._read(line, known)
@@ -146,7 +146,7 @@ class _Run:
         if not self.skip:
             self.sink.begin()
 
-    def _recognise(self, line: bytes) -> None:
+    def _match_checkpoint(self, line: bytes) -> None:
         """By its header and first measurement, whether this is the stream of the checkpoint, to be skipped as far as it got."""
         if len(self.first) == 2:
             return
@@ -169,15 +169,15 @@ class _Run:
 
     def _read(self, line: bytes, known: bool) -> None:
         """A line with something in it: the header, or a measurement, of which a known one was taken before."""
-        from piazzi.io.rows import RowReader
+        from piazzi.io.lines import RowReader
 
         if self.reader is None:
             self.reader = RowReader.begin(self.problem, line.rstrip(b"\r\n"), self.lines)
             self._begin_output()
         elif not known:
-            self._take(self.reader, line)
+            self._update(self.reader, line)
 
-    def _take(self, reader: RowReader, line: bytes) -> None:
+    def _update(self, reader: RowReader, line: bytes) -> None:
         try:
             row = reader.read(line, self.lines)
             if self.session.update(row.station, row.values, row.time) is False:

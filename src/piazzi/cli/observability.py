@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from piazzi.cli import options, reporting
-from piazzi.cli.ending import Ending
+from piazzi.cli import options, results
 
 if TYPE_CHECKING:
-    from piazzi.evaluate import Observability
+    from piazzi.evaluate.observable import Observability
     from piazzi.present.report import Tab
 
 
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 @options.as_json
 @options.seed
 @options.scenario
-@reporting.option
+@results.report_option
 def command(
     source: str,
     added: tuple[str, ...],
@@ -47,11 +46,11 @@ def command(
       piazzi observability b612-range-q0 --add "b=atan2(y, x):sigma=0.01,angle"
       piazzi observability network.toml --add radar --json
     """
-    ending = Ending(output_file, as_json, report)
-    ending.check()
+    outputs = results.Outputs(output_file, as_json, report)
+    outputs.check()
     from piazzi.cli.additions import additions
     from piazzi.cli.sources import load_source
-    from piazzi.evaluate import observability
+    from piazzi.evaluate.observing import observability
 
     source_found = load_source(source, seed, scenario)
     problem, tracking = source_found.problem, source_found.tracking
@@ -61,9 +60,9 @@ def command(
     def tab() -> Tab:
         from piazzi.present.report import observability_tab
 
-        return observability_tab(found, title=reporting.titled(source, source_found.name, scenario)[0])
+        return observability_tab(found, title=results.title_and_planet(source, source_found.name, scenario)[0])
 
-    return ending.give(found, lambda: growth_rows(found), tab)
+    return outputs.write(found, lambda: growth_rows(found), tab)
 
 
 def growth_rows(found: Observability) -> list[dict[str, Any]]:

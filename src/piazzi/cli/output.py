@@ -128,9 +128,9 @@ def _cell(value: Any) -> Any:
     """Text that nothing is hidden in, and that no spreadsheet takes for a formula; anything else as it is."""
     if not isinstance(value, str):
         return value
-    from piazzi.text import printable, unformulated
+    from piazzi.text import escape_formula, printable
 
-    return unformulated(printable(value))
+    return escape_formula(printable(value))
 
 
 def beside() -> Console:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from piazzi.cli import options, output, reporting
+from piazzi.cli import options, output, results
 from piazzi.cli.running import DONE, NOT_ESTIMATED, say
 from piazzi.cli.windows import whole_numbers
 
@@ -58,9 +58,9 @@ def command(
     """
     if output_file == output.STDOUT:
         raise click.UsageError("-o -: a page goes into a file", click.get_current_context(silent=True))
-    output.check_output(output_file, reporting.ENDINGS)
+    output.check_output(output_file, results.PAGES)
     estimators = options.parsed(names, DEFAULT)
-    from piazzi.cli.comparing import run_comparison
+    from piazzi.cli.sources import run_comparison
     from piazzi.present.report import comparison_tab
 
     tabs, success = [], True
@@ -68,18 +68,19 @@ def command(
         name, comparison, warning = run_comparison(
             source, estimators, seed, scenario if source.lower().endswith(".csv") else None, bar=True
         )
-        title, radius = reporting.titled(source, name, scenario)
+        title, radius = results.title_and_planet(source, name, scenario)
         more, well = _more(comparison, lags, seen)
         tabs.append(comparison_tab(comparison, title=title, planet_radius=radius, more=more, warning=warning))
         success &= comparison.success and well
-    wrote = reporting.write(output_file, tabs)
+    wrote = results.write_page(output_file, tabs)
     output.print_rich(f"Wrote {wrote}: open it in a browser.")
     return DONE if success else NOT_ESTIMATED
 
 
 def _more(comparison: Comparison, lags: tuple[int, ...], seen: bool) -> tuple[list[Section], bool]:
     """Sections on windows and observability where they were asked for, and whether all of it succeeded."""
-    from piazzi.evaluate import observability, windows
+    from piazzi.evaluate.observing import observability
+    from piazzi.evaluate.window_lengths import windows
     from piazzi.present.report import observability_section, windows_section
 
     problem, tracking, sections, well = comparison.problem, comparison.tracking, [], True

@@ -55,14 +55,14 @@ def _guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
     except Exception as error:
         if os.environ.get("PIAZZI_DEBUG", "0") not in ("", "0"):
             traceback.print_exc()
-        status, message = _told(error)
+        status, message = _status_and_message(error)
         say(message)
         if isinstance(error, OSError):
             _abandon_stdout()
         return status
 
 
-def _told(error: Exception) -> tuple[int, str]:
+def _status_and_message(error: Exception) -> tuple[int, str]:
     """Exit status and message of an error."""
     from click.exceptions import NoArgsIsHelpError
 

@@ -1,4 +1,4 @@
-"""SOURCE of the command line -> problem and tracking."""
+"""SOURCE of the command line -> problem and tracking, and the estimators that commands run on them."""
 
 from __future__ import annotations
 
@@ -6,15 +6,25 @@ import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from piazzi.cli import output
+from piazzi.cli.running import say
 from piazzi.problem import Problem, Tracking
+
+if TYPE_CHECKING:
+    from piazzi.estimate import Estimator
+    from piazzi.evaluate import Comparison
+
 
 STDIN = "-"
 _STARTS = {b"PK": ".npz", b"\x89HDF": ".nc", b"CDF": ".nc"}
+_LONG = 200_000  # epochs times estimators from which a run takes long enough to show a bar
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +49,7 @@ def load_source(source: str, seed: int, scenario: str | None = None) -> Source:
     if source != STDIN:
         problem, tracking = load(source, seed=seed, scenario=scenario)
         found = Source(problem, tracking, os.path.basename(source) or source, source.lower().endswith(RECORDINGS))
-        _tell_moved_prior(found, scenario)
+        _say_moved_prior(found, scenario)
         return found
     path = _spooled(scenario)
     try:
@@ -50,11 +60,11 @@ def load_source(source: str, seed: int, scenario: str | None = None) -> Source:
     finally:
         path.unlink(missing_ok=True)
     found = Source(problem, tracking, STDIN, path.suffix in RECORDINGS)
-    _tell_moved_prior(found, scenario)
+    _say_moved_prior(found, scenario)
     return found
 
 
-def _tell_moved_prior(found: Source, scenario: str | None) -> None:
+def _say_moved_prior(found: Source, scenario: str | None) -> None:
     """Say it where a recording began before the prior of its scenario."""
     first = float(found.tracking.times[0])
     if scenario is None or found.problem.prior_time != first:
@@ -95,3 +105,49 @@ def _spooled(scenario: str | None) -> Path:
             os.unlink(file.name)
             raise
     return Path(file.name)
+
+
+def run_comparison(
+    source: str,
+    estimators: Mapping[str, Estimator],
+    seed: int,
+    scenario: str | None,
+    *,
+    bar: bool = False,
+    thorough: bool = True,
+) -> tuple[str, Comparison, str]:
+    """The source's name, the comparison of these estimators on it, and a warning of long steps, "" for none.
+
+    Raises as `piazzi.loading` and `piazzi.compare` do.  A bar of progress is shown for long runs, and where it is asked for;
+    `thorough` is for `compare`.
+    """
+    from piazzi.evaluate import compare
+
+    found = load_source(source, seed, scenario)
+    with output.progress(len(estimators), long=bar or len(found.tracking.times) * len(estimators) > _LONG) as step:
+        comparison = compare(found.problem, found.tracking, estimators, source=found.name, announce=step, thorough=thorough)
+    warning = _warning_of_steps(found, comparison, estimators)
+    if warning:
+        say(f"warning: {found.name}: {warning}")
+    return found.name, comparison, warning
+
+
+def _warning_of_steps(found: Source, comparison: Comparison, estimators: Mapping[str, Estimator]) -> str:
+    """What to say where the steps are long beside the noise, unless the truth was simulated with the same steps.
+
+    Judged by an estimator whose kernel this run has compiled anyway, where there is one: the filter, where it or a graph (which
+    starts from it) is asked for, else the first that gives states in real time, else the filter.
+    """
+    from piazzi.estimate import ExtendedKalmanFilter, FactorGraph
+    from piazzi.estimate.estimator import views_of
+    from piazzi.estimate.long_steps import step_warning
+
+    truth = found.problem.truth
+    if not found.recorded and (truth is None or truth.integrator is None):
+        return ""
+    used = [estimators[name] for name, estimate in comparison.estimates.items() if estimate.success]
+    plain = ExtendedKalmanFilter()
+    if not any(e == plain or isinstance(e, FactorGraph) for e in used):
+        realtime = [e for e in used if "realtime" in views_of(e)]
+        plain = realtime[0] if realtime else plain  # type: ignore[assignment]
+    return step_warning(found.problem, found.tracking, estimator=plain)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from piazzi.cli import options, output, reporting
+from piazzi.cli import options, output, results
 from piazzi.cli.running import DONE, NOT_ESTIMATED, say
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ ENDINGS = (".nc",)
 @click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler, tcp://host:8786, or 'local' to start a cluster here.")
 @click.option("--chunk", type=options.WholeNumber(1), metavar="N", help="Runs per task.  [default: about a second's]")
 @click.option("--figures", metavar="FOLDER", help="Write pictures there.")
-@reporting.option
+@results.report_option
 @options.as_json
 @options.seed
 def command(
@@ -72,7 +72,7 @@ def command(
     output.check_output(output_file, ENDINGS)
     if resume and output_file is None:
         raise click.UsageError("--resume needs -o FILE, the study to continue", click.get_current_context())
-    reporting.check(report)
+    results.check_report(report)
     if figures is not None:
         output.make_folder(figures, "study-nees.png")
     _check_scenario(scenario)
@@ -90,12 +90,12 @@ def command(
         if report is not None:
             from piazzi.present.report import study_tabs
 
-            title, _ = reporting.titled(scenario, study.name, None)
-            wrote.append(f"Wrote {reporting.write(report, study_tabs(summary, title))}")
+            title, _ = results.title_and_planet(scenario, study.name, None)
+            wrote.append(f"Wrote {results.write_page(report, study_tabs(summary, title))}")
         if as_json:
             output.print_json(summary.to_dict())
         else:
-            from piazzi.present.studies import StudyTable, failures, heading
+            from piazzi.present.study_table import StudyTable, failures, heading
 
             output.print_rich(heading(stored), "", StudyTable(summary), *failures(summary), *wrote)
     return DONE if summary.success else NOT_ESTIMATED

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from piazzi.cli import options, output, reporting
-from piazzi.cli.ending import Ending
+from piazzi.cli import options, output, results
 
 if TYPE_CHECKING:
     from piazzi.present.report import Tab
@@ -47,7 +46,7 @@ def whole_numbers(context: click.Context, parameter: click.Parameter, text: str)
 @options.as_json
 @options.seed
 @options.scenario
-@reporting.option
+@results.report_option
 def command(
     source: str,
     lags: tuple[int, ...],
@@ -69,11 +68,10 @@ def command(
       piazzi windows b612-range --lags 1,5,20,100 --iterations 3 --json
       piazzi windows satellite-bearing -o windows.csv
     """
-    ending = Ending(output_file, as_json, report)
-    ending.check()
+    outputs = results.Outputs(output_file, as_json, report)
+    outputs.check()
     from piazzi.cli.sources import load_source
-    from piazzi.evaluate import windows
-    from piazzi.evaluate.window_lengths import steps_of
+    from piazzi.evaluate.window_lengths import steps_of, windows
 
     found = load_source(source, seed, scenario)
     problem, tracking = found.problem, found.tracking
@@ -84,6 +82,6 @@ def command(
     def tab() -> Tab:
         from piazzi.present.report import windows_tab
 
-        return windows_tab(trade, title=reporting.titled(source, found.name, scenario)[0])
+        return windows_tab(trade, title=results.title_and_planet(source, found.name, scenario)[0])
 
-    return ending.give(trade, trade.records, tab)
+    return outputs.write(trade, trade.records, tab)

@@ -18,7 +18,7 @@ import numpy as np
 from piazzi.earth import scales
 from piazzi.earth.delta_t import MODEL, delta_t, delta_t_error
 from piazzi.earth.scales import Pole
-from piazzi.sources import opened
+from piazzi.opening import opened
 
 Array = np.ndarray[Any, Any]
 
@@ -91,7 +91,7 @@ class EOPTable:
     def _at(self, whole: Array, fraction: Array, early: bool = False) -> tuple[Array, Array, Array]:
         """First of the four days that an instant lies in the middle of, days since that day, and days past the table's end."""
         tai_day, seconds, part = scales.reading("TAI", whole, fraction)
-        utc = tai_day + (seconds + part) / scales.DAY - _ahead(tai_day) / scales.DAY
+        utc = tai_day + (seconds + part) / scales.DAY - _tai_utc(tai_day) / scales.DAY
         beyond = np.maximum(utc - self.mjd[-1], self.mjd[0] - utc)
         if np.any(beyond > 0.0) and (early or np.any(utc > self.mjd[-1])):
             self._warn(float(utc.flat[int(np.argmax(beyond))]), float(np.max(beyond)))
@@ -102,7 +102,7 @@ class EOPTable:
     def ut1_tai(self, whole: Array, fraction: Array) -> Array:
         """UT1 - TAI in seconds, (K,): by the table, before it by a model of Delta T, after it at the rate of its last year."""
         first, u, past = self._at(whole, fraction)
-        value = _through(self.daily_ut1_tai, first, u)[0]
+        value = _cubic(self.daily_ut1_tai, first, u)[0]
         value = value + np.where(past > 0.0, past * self._last_rate, 0.0)
         if np.any(past < 0.0):
             early = delta_t(np.where(past < 0.0, decimal_year(whole), 1970.0))
@@ -112,14 +112,14 @@ class EOPTable:
     def ut1_rate(self, whole: Array, fraction: Array) -> Array:
         """Seconds of UT1 - TAI per second, (K,)."""
         first, u, past = self._at(whole, fraction)
-        slope = _through(self.daily_ut1_tai, first, u)[1]
+        slope = _cubic(self.daily_ut1_tai, first, u)[1]
         slope = np.where(past > 0.0, self._last_rate, np.where(past < 0.0, 0.0, slope))
         return np.asarray(slope / scales.DAY)
 
     def pole(self, whole: Array, fraction: Array) -> Pole:
         """Pole and celestial pole offsets at instants; the nearest day's outside of the table, none before 1962."""
         first, u, past = self._at(whole, fraction, early=True)
-        values, rates = _through(self.daily_pole, first, u)
+        values, rates = _cubic(self.daily_pole, first, u)
         inside = (past == 0.0)[..., None]
         return Pole(np.where((past < 0.0)[..., None], 0.0, values), np.where(inside, rates, 0.0) / scales.DAY)
 
@@ -144,7 +144,7 @@ class EOPTable:
         warnings.warn(text, EOPWarning, stacklevel=4)
 
 
-def _ahead(tai_day: Array) -> Array:
+def _tai_utc(tai_day: Array) -> Array:
     return scales.tai_utc(np.maximum(tai_day, scales.UTC_BEGINS), np.zeros_like(tai_day))
 
 
@@ -161,7 +161,7 @@ def mjd_text(mjd: float) -> str:
     return f"{int(year):04d}-{int(month):02d}-{int(day):02d}"
 
 
-def _through(daily: Array, first: Array, u: Array) -> tuple[Array, Array]:
+def _cubic(daily: Array, first: Array, u: Array) -> tuple[Array, Array]:
     """Value and daily rate of the cubic through four days from `first`, `u` days after the first."""
     u = u[..., None] if daily.ndim > 1 else u
     y0, y1, y2, y3 = (daily[first + i] for i in range(4))

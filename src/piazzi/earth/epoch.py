@@ -67,7 +67,7 @@ class Epoch:
         if not (np.isfinite(whole) and np.isfinite(fraction)):
             raise ValueError(f"an instant is {whole!r} + {fraction!r} s past J2000.0; it must be finite")
         floor = float(np.floor(whole))
-        one, two = scales.normal(np.array(floor), np.array((whole - floor) + fraction))
+        one, two = scales.normalized(np.array(floor), np.array((whole - floor) + fraction))
         epoch = cls.__new__(cls)
         object.__setattr__(epoch, "whole", float(one))
         object.__setattr__(epoch, "fraction", float(two))
@@ -117,7 +117,7 @@ class Epoch:
 
     def since(self, other: Epoch) -> tuple[float, float]:
         """Seconds of TT from `other` to here, as a whole number and a fraction in [0, 1): exact to 1e-9 s at any span."""
-        whole, fraction = scales.normal(np.array(self.whole - other.whole), np.array(self.fraction - other.fraction))
+        whole, fraction = scales.normalized(np.array(self.whole - other.whole), np.array(self.fraction - other.fraction))
         return float(whole), float(fraction)
 
     def __add__(self, seconds: float | tuple[float, float]) -> Epoch:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piazzi.earth.epoch import Epoch
-from piazzi.sources import opened
+from piazzi.opening import opened
 
 Array = np.ndarray[Any, Any]
 

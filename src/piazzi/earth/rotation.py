@@ -172,7 +172,7 @@ def _turn(whole: Array, fraction: Array, eop: Orientation) -> tuple[Array, Array
 def _ut1(whole: Array, fraction: Array, eop: Orientation) -> tuple[Array, Array]:
     """Julian date of UT1 as two numbers."""
     behind = scales.TT_TAI - eop.ut1_tai(whole, fraction)
-    return scales.days(*scales.normal(whole, fraction - behind))
+    return scales.days(*scales.normalized(whole, fraction - behind))
 
 
 def _about_z(angle: Array) -> Array:

@@ -42,7 +42,7 @@ class Orientation(Protocol):
     def pole(self, whole: Array, fraction: Array) -> Pole: ...
 
 
-def normal(whole: Array, fraction: Array) -> tuple[Array, Array]:
+def normalized(whole: Array, fraction: Array) -> tuple[Array, Array]:
     """The same number of seconds with a fraction in [0, 1)."""
     carry = np.floor(fraction)
     fraction = fraction - carry
@@ -78,26 +78,26 @@ def to_tt(
     """The instants of readings of `scale`; UT1 needs an `orientation`."""
     whole = (day - 51544.0) * DAY - DAY / 2 + seconds
     if scale in ("TDB", "TCG", "UT1"):
-        guess = normal(whole, fraction)
+        guess = normalized(whole, fraction)
         for _ in range(3):  # the offset changes by 1e-8 of itself at the most
-            guess = normal(whole, fraction + offset(scale, *guess, orientation))
+            guess = normalized(whole, fraction + offset(scale, *guess, orientation))
         return guess
     if scale == "UTC":
         ahead = tai_utc(day, seconds + fraction)
         full = np.floor(ahead)
-        return normal(whole + full + 32.0, fraction + (ahead - full) + 0.184)
+        return normalized(whole + full + 32.0, fraction + (ahead - full) + 0.184)
     steps, rest = _BEHIND_TT[scale]
-    return normal(whole + steps, fraction + rest)
+    return normalized(whole + steps, fraction + rest)
 
 
 def reading(scale: str, whole: Array, fraction: Array, orientation: Orientation | None = None) -> tuple[Array, Array, Array]:
     """Day (Modified Julian), whole seconds of the day and fraction that a clock of `scale` shows at instants."""
     if scale == "UTC":
-        return _utc(*_since_midnight(*normal(whole - 32.0, fraction - 0.184)))
+        return _utc(*_since_midnight(*normalized(whole - 32.0, fraction - 0.184)))
     if scale in _BEHIND_TT:
         steps, rest = _BEHIND_TT[scale]
-        return _since_midnight(*normal(whole - steps, fraction - rest))
-    return _since_midnight(*normal(whole, fraction - offset(scale, whole, fraction, orientation)))
+        return _since_midnight(*normalized(whole - steps, fraction - rest))
+    return _since_midnight(*normalized(whole, fraction - offset(scale, whole, fraction, orientation)))
 
 
 def _since_midnight(whole: Array, fraction: Array) -> tuple[Array, Array, Array]:
@@ -117,7 +117,7 @@ def _utc(day: Array, seconds: Array, fraction: Array) -> tuple[Array, Array, Arr
     for _ in range(2):
         ahead = np.where(day < 41317.0, tai_utc(day, seconds + fraction - ahead), ahead)
     steps = np.floor(ahead)
-    return day, *normal(seconds - steps, fraction - (ahead - steps))
+    return day, *normalized(seconds - steps, fraction - (ahead - steps))
 
 
 def offset(scale: str, whole: Array, fraction: Array, orientation: Orientation | None = None) -> Array:

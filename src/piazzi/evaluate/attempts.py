@@ -79,5 +79,5 @@ def _last_half(estimator: Estimator, problem: Problem, tracking: Tracking) -> tu
 def _orbits(problem: Problem, tracking: Tracking, twins: Sequence[Twin]) -> list[Array]:
     """Where each twin is at the last epoch, (1, n)."""
     inputs = prepare(problem, tracking)
-    still = replace(inputs, z=np.full_like(inputs.z, np.nan))
-    return [coast(problem, still, twin.state)[-1:] for twin in twins]
+    unmeasured = replace(inputs, z=np.full_like(inputs.z, np.nan))
+    return [coast(problem, unmeasured, twin.state)[-1:] for twin in twins]

@@ -88,7 +88,8 @@ def posterior_bounds(problem: Problem, tracking: Tracking) -> Bounds | None:
         chain, solver, skip = _solved(problem, inputs, truth)
         smoothed = solver.marginals()
         P, d = chain.P_pred[skip:], chain.d_pred[skip:]
-        _absorb(P, d, chain.nu, chain.H, inputs.first_row, np.empty_like(chain.nu))  # in place: long runs fill the memory
+        # in place: long runs fill the memory
+        _update_in_place(P, d, chain.nu, chain.H, inputs.first_row, np.empty_like(chain.nu))
     if not (np.isfinite(P).all() and np.isfinite(smoothed[skip:]).all()):
         return None
     return Bounds(P, smoothed[skip:], np.add(truth, d, out=d))
@@ -116,7 +117,7 @@ def linearized(problem: Problem, tracking: Tracking, states: Array) -> Linearize
         chain, solver, skip = _solved(problem, inputs, states)
         smoothed, cross = solver.marginals(), solver.cross()
         predicted, d = chain.P_pred[skip:], chain.d_pred[skip:]
-        whitened, updated, deviation = absorb(predicted, d, chain.nu, chain.H, inputs.first_row)
+        whitened, updated, deviation = update_covariances(predicted, d, chain.nu, chain.H, inputs.first_row)
     nodes = chain.inputs
     last = nodes.epochs - 1
     noise = chain.Q_all[:last] if problem.noise_varies else _scaled(problem, nodes.scale)
@@ -147,7 +148,7 @@ def _scaled(problem: Problem, scale: Array) -> Array:
     return np.asarray(scale[1:, None, None] * problem.process_noise.covariance)
 
 
-def absorb(P: Array, d: Array, nu: Array, H: Array, first_row: Array) -> tuple[Array, Array, Array]:
+def update_covariances(P: Array, d: Array, nu: Array, H: Array, first_row: Array) -> tuple[Array, Array, Array]:
     """Standardised innovations (J, m); covariances (K, n, n) and deviations (K, n) after the measurements of every epoch.
 
     Scalars one after the other, of many epochs at once, so that rows of one epoch are whitened against each other too.
@@ -159,21 +160,21 @@ def absorb(P: Array, d: Array, nu: Array, H: Array, first_row: Array) -> tuple[A
     first_row : (K + 1,), first row of each epoch
     """
     P, d, out = P.copy(), d.copy(), np.empty_like(nu)
-    _absorb(P, d, nu, H, first_row, out)
+    _update_in_place(P, d, nu, H, first_row, out)
     return out, P, d
 
 
-def _absorb(P: Array, d: Array, nu: Array, H: Array, first_row: Array, out: Array) -> None:
+def _update_in_place(P: Array, d: Array, nu: Array, H: Array, first_row: Array, out: Array) -> None:
     """The same in place, block by block of epochs, so that the work space does not grow with them."""
     out.fill(np.nan)
     for start in range(0, len(P), _BLOCK):
         block = slice(start, start + _BLOCK)
         ends = first_row[start : start + _BLOCK + 1]
         part = slice(ends[0], ends[-1])
-        _absorb_block(P[block], d[block], nu[part], H[part], ends[:-1] - ends[0], np.diff(ends), out[part])
+        _update_block(P[block], d[block], nu[part], H[part], ends[:-1] - ends[0], np.diff(ends), out[part])
 
 
-def _absorb_block(P: Array, d: Array, nu: Array, H: Array, first_row: Array, rows: Array, out: Array) -> None:
+def _update_block(P: Array, d: Array, nu: Array, H: Array, first_row: Array, rows: Array, out: Array) -> None:
     for slot in range(int(rows.max())):
         for i in range(nu.shape[1]):
             k = np.flatnonzero(rows > slot)

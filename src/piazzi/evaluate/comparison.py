@@ -15,11 +15,10 @@ from piazzi.estimate import Estimate, Estimator
 from piazzi.estimate.estimator import views_of
 from piazzi.estimate.registry import by_name
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
-from piazzi.evaluate.dataset import numbers
-from piazzi.evaluate.display import html, render
+from piazzi.evaluate.comparison_table import html, render
+from piazzi.evaluate.consistency_tests import LONGEST
 from piazzi.evaluate.grids import as_text
-from piazzi.evaluate.honesty import LONGEST
-from piazzi.evaluate.rows import Row, evaluate
+from piazzi.evaluate.rows import Row, evaluate, numbers
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.inputs import prepare
 
@@ -119,7 +118,7 @@ def compare(
     estimators : mapping of the name to show to the estimator, or names as on the command line, such as ["ekf", "window:100"]
     source : where the measurements came from, for the record
     announce : called with each name before its estimator starts
-    thorough : whether to find the Cramer-Rao bound and to make the tests of honesty too, for which the problem is linearised
+    thorough : whether to find the Cramer-Rao bound and test consistency too, for which the problem is linearised
 
     Raises
     ------

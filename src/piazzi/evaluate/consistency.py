@@ -1,4 +1,4 @@
-"""Tests of honesty on arrays: does a covariance admit the errors, are innovations white and without bias.
+"""Tests of consistency on arrays: does a covariance admit the errors, are innovations white and without bias.
 
 Every function takes plain arrays, so that one run, many runs and studies use the same ones.
 """

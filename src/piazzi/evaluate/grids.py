@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -53,14 +53,13 @@ def as_rich(grids: Sequence[Grid], sentences: Sequence[str], console: Console, o
 
 def _fitted(grid: Grid, console: Console, options: ConsoleOptions) -> Iterable[Any]:
     """The title and a table for rich, without spare columns where it would be too wide; then each row as a block of lines."""
-    from rich.measure import Measurement
     from rich.text import Text
 
     if grid.title:
         yield Text(printable(grid.title), style="bold")
     for count in range(len(grid.spare) + 1):
         table = _table(grid.without(grid.spare[:count]))
-        if Measurement.get(console, options.update(max_width=10_000), table).maximum <= options.max_width:
+        if fits(table, console, options):
             yield table
             break
     else:
@@ -68,18 +67,32 @@ def _fitted(grid: Grid, console: Console, options: ConsoleOptions) -> Iterable[A
     yield Text("")
 
 
-def _table(grid: Grid) -> Any:
+def rich_table(
+    heads: Iterable[tuple[str, bool]], rows: Iterable[Iterable[str]], style: Callable[[str], str] = lambda cell: ""
+) -> Any:
+    """A table for rich that does not wrap: headings, each with whether its column holds words, and rows of printable text."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=box.SIMPLE_HEAD, header_style="bold", show_edge=False, padding=(0, 1, 0, 0))
-    for i, head in enumerate(grid.heads):
-        lines = Text("\n".join(map(printable, head.split("\n"))))
-        table.add_column(lines, justify="left" if i < grid.left else "right", no_wrap=True, vertical="bottom")
-    for row in grid.rows:
-        table.add_row(*(Text(printable(cell)) for cell in row))
+    for head, words in heads:
+        table.add_column(Text(head), justify="left" if words else "right", no_wrap=True, vertical="bottom")
+    for row in rows:
+        table.add_row(*(Text(cell, style=style(cell)) for cell in row))
     return table
+
+
+def fits(table: Any, console: Console, options: ConsoleOptions) -> bool:
+    """Whether a table is no wider than the terminal."""
+    from rich.measure import Measurement
+
+    return Measurement.get(console, options.update(max_width=10_000), table).maximum <= options.max_width
+
+
+def _table(grid: Grid) -> Any:
+    heads = [("\n".join(map(printable, head.split("\n"))), i < grid.left) for i, head in enumerate(grid.heads)]
+    return rich_table(heads, [map(printable, row) for row in grid.rows])
 
 
 def _blocks(grid: Grid) -> Iterable[Any]:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from piazzi.problem.checks import Array
 
 CLEARLY = 1.5  # times as large: one run without a test cannot tell a smaller factor
-LEVEL = 1.01  # errors nearer than this are called the same
-SETTLING = 5.0  # times the error of the last half that the whole run's must be to be called slow to settle
+SAME_ERROR = 1.01  # errors nearer than this are called the same
+SLOW_CONVERGENCE = 5.0  # times the error of the last half that the whole run's must be to be called slow to settle
 OPTIMISTIC, CONSISTENT, PESSIMISTIC = 1, 0, -1
 
 
@@ -47,7 +47,7 @@ class Claim:
         )
 
 
-def sound(rows: Sequence[Row]) -> list[Row]:
+def not_diverged(rows: Sequence[Row]) -> list[Row]:
     """Rows whose covariance is worth a judgement: the others failed or diverged, and are reported as such."""
     return [r for r in rows if r.success and not r.diverged]
 
@@ -65,7 +65,7 @@ def claims(rows: Sequence[Row], values: Array) -> list[Claim]:
     rows : of a comparison
     values : (J, m) the measurements, NaN where missing
     """
-    chosen = sound(rows)
+    chosen = not_diverged(rows)
     known, expected = errors_known(chosen), expected_nis(values)
     found = [(r, judged) for r in chosen if (judged := _judged(r, known, expected)) is not None]
     out = []
@@ -86,7 +86,7 @@ def _judged(row: Row, known: bool, expected: float | None) -> tuple[float, int] 
     if value is None or not isfinite(value) or not ideal:
         return None
     factor = sigma_factor(value, ideal)
-    check = row.honesty.nees_last_half if known else row.honesty.nis
+    check = row.tests.nees_last_half if known else row.tests.nis
     if check is None or not isfinite(check.high):
         return factor, int(factor > CLEARLY) - int(factor < 1 / CLEARLY)
     return factor, int(check.statistic > check.high) - int(check.statistic < check.low)
@@ -116,13 +116,13 @@ def failing(row: Row) -> list[str]:
     return [name for name, check in _checks(row).items() if check is not None and not check.passed]
 
 
-def fails_early(row: Row) -> bool:
+def fails_at_first_only(row: Row) -> bool:
     """Whether NEES is out of its bounds over the whole run, but not over its last half."""
-    whole, last = row.honesty.nees, row.honesty.nees_last_half
+    whole, last = row.tests.nees, row.tests.nees_last_half
     return whole is not None and last is not None and last.passed and not whole.passed
 
 
 def _checks(row: Row) -> dict[str, Check | None]:
     """The tests that are shown, by the name that they are shown under: NEES once the estimator has settled."""
-    h = row.honesty
+    h = row.tests
     return {"NEES": h.nees_last_half, "NIS": h.nis, "whiteness": h.whiteness, "bias": h.bias}

@@ -213,9 +213,9 @@ def diverged(estimate: Estimate, error: Array | None, consistency: Consistency |
     if not np.isfinite(estimate.mean).all():
         return True
     if error is not None and consistency is not None:
-        return _denied(consistency) and _persists(error, list(groups(estimate).values()), from_first=True)
+        return _inconsistent(consistency) and _not_decreasing(error, list(groups(estimate).values()), from_first=True)
     columns = [(i,) for i in range(estimate.innovations.shape[1])]
-    return _denied(nis(estimate)) and _persists(estimate.innovations, columns, from_first=False)
+    return _inconsistent(nis(estimate)) and _not_decreasing(estimate.innovations, columns, from_first=False)
 
 
 def groups(estimate: Estimate) -> dict[str, tuple[int, ...]]:
@@ -224,7 +224,7 @@ def groups(estimate: Estimate) -> dict[str, tuple[int, ...]]:
     return model.group_indices or {name: (i,) for i, name in enumerate(model.names)}
 
 
-def _denied(consistency: Consistency) -> bool:
+def _inconsistent(consistency: Consistency) -> bool:
     half = slice(len(consistency.value) // 2, None)
     known = consistency.rank[half] > 0
     if not known.any():
@@ -233,12 +233,12 @@ def _denied(consistency: Consistency) -> bool:
     return bool(np.median(consistency.value[half][known]) > FAR * quantile(0.999, float(typical)))
 
 
-def stays(first: Any, earlier: Any, later: Any) -> Any:
+def not_decreasing(first: Any, earlier: Any, later: Any) -> Any:
     """Whether an error does not come down, by its sizes at the first epoch and in the last two quarters: numbers or arrays."""
     return (later >= 0.5 * earlier) | (later > first)
 
 
-def _persists(error: Array, columns: Sequence[Sequence[int]], from_first: bool) -> bool:
+def _not_decreasing(error: Array, columns: Sequence[Sequence[int]], from_first: bool) -> bool:
     """Whether the error of every group of columns stays; False for a run too short."""
     K = len(error)
     found, known = [], ~np.isnan(error)
@@ -246,7 +246,7 @@ def _persists(error: Array, columns: Sequence[Sequence[int]], from_first: bool) 
     for group in columns:
         first, earlier, later = (rmse(error, group, rows, known) for rows in quarters)
         if earlier is not None and later is not None:
-            found.append(stays(first if from_first and first is not None else np.inf, earlier, later))
+            found.append(not_decreasing(first if from_first and first is not None else np.inf, earlier, later))
     return bool(found) and all(found)
 
 

@@ -14,7 +14,7 @@ from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
 from piazzi.evaluate.information import Information
 from piazzi.evaluate.quantities import display_of, finite, number
 from piazzi.evaluate.twins import Twin
-from piazzi.evaluate.verdict import FEEBLE, conclusion, local, twins_found, unreliable, weakest
+from piazzi.evaluate.verdict import AS_THE_PRIOR, conclusion, local, twins_found, unreliable, weakest
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.text import printable
@@ -101,7 +101,7 @@ class Observability:
     @property
     def since(self) -> float | None:
         """Time, s, from which on the measurements determine every direction better than the prior; None for never."""
-        better = np.flatnonzero(self.growth_values[:, -1] > FEEBLE)
+        better = np.flatnonzero(self.growth_values[:, -1] > AS_THE_PRIOR)
         return float(self.growth_times[better[0]]) if better.size else None
 
     def to_dict(self) -> dict[str, Any]:

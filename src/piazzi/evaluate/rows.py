@@ -1,4 +1,4 @@
-"""One estimate's account of itself: errors beside the best possible, honesty, cost."""
+"""One estimate's account of itself: errors beside the best possible, consistency, cost."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ import numpy as np
 from piazzi.estimate import Estimate
 from piazzi.evaluate.bounds import Bounds
 from piazzi.evaluate.consistency import Check
-from piazzi.evaluate.honesty import Honesty, judged
+from piazzi.evaluate.consistency_tests import ConsistencyTests, check_consistency
 from piazzi.evaluate.metrics import convergence_time, diverged, groups, known_truth, nis, outliers, rmse, squared_in_sigmas
-from piazzi.evaluate.quantities import finite
+from piazzi.evaluate.quantities import finite, unit_of
+from piazzi.model import Model
+from piazzi.problem.checks import Array
 
 _ALWAYS = ("position", "velocity")  # groups that every row has, None where the model does not name them
 
@@ -27,9 +29,9 @@ class Row:
     rmse, rmse_last_half : one number for each group of states; the last half is rows K//2 onward
     crlb, crlb_last_half : the posterior Cramer-Rao bound of the same, for this view and this truth: no estimator that is
         unbiased does better on average, a single run may
-    mean_nees, mean_nees_last_half, mean_nis : honesty; near `nees_ideal`, `nees_ideal_last_half` and the components per row
+    mean_nees, mean_nees_last_half, mean_nis : consistency; near `nees_ideal`, `nees_ideal_last_half` and the components per row
     nees_ideal, nees_ideal_last_half : mean rank of the covariance, over the states whose truth is known; n where it is regular
-    honesty : Honesty, tests of that with bounds
+    tests : ConsistencyTests, tests of that with bounds
     convergence_time : seconds until the error of the first group stays, in the RMS of all that follows, within twice its last
         half's
     diverged : see `piazzi.evaluate.has_diverged`
@@ -53,7 +55,7 @@ class Row:
     crlb: Mapping[str, float | None] = field(default_factory=dict)
     crlb_last_half: Mapping[str, float | None] = field(default_factory=dict)
     convergence_time: float | None = None
-    honesty: Honesty = field(default_factory=Honesty)
+    tests: ConsistencyTests = field(default_factory=ConsistencyTests)
     rejected: int | None = None
     outliers: int | None = None
     modes: Sequence[Mapping[str, Any]] | None = None
@@ -73,12 +75,12 @@ class Row:
         out |= {f"{g}_crlb": finite(self.crlb.get(g)) for g in names}
         out |= {f"{g}_crlb_last_half": finite(self.crlb_last_half.get(g)) for g in names}
         out["convergence_time"] = finite(self.convergence_time)
-        out |= _tests(self.honesty)
+        out |= _tests(self.tests)
         extra = {k: getattr(self, k) for k in ("rejected", "outliers", "modes")}
         return out | {k: v for k, v in extra.items() if v is not None}
 
 
-def _tests(found: Honesty) -> dict[str, float | None]:
+def _tests(found: ConsistencyTests) -> dict[str, float | None]:
     """Statistics and bounds of the tests as flat numbers."""
     out: dict[str, float | None] = {}
     two_sided = {"nees": found.nees, "nees_last_half": found.nees_last_half, "nis": found.nis}
@@ -103,7 +105,7 @@ def evaluate(name: str, estimate: Estimate, bounds: Bounds | None = None, *, tho
     name : of the estimator
     estimate : Estimate
     bounds : of the problem at the truth, from `posterior_bounds`; without them the row has no Cramer-Rao bound
-    thorough : whether to make the tests of `Honesty`, for which the problem is linearised about the estimate
+    thorough : whether to make the tests of `ConsistencyTests`, for which the problem is linearised about the estimate
     """
     last = slice(len(estimate.mean) // 2, None)
     columns, truth = groups(estimate), known_truth(estimate)
@@ -130,7 +132,7 @@ def evaluate(name: str, estimate: Estimate, bounds: Bounds | None = None, *, tho
         convergence_time=None
         if lost or error is None
         else convergence_time(error, next(iter(columns.values())), estimate.times),
-        honesty=judged(estimate, consistency) if thorough else Honesty(),
+        tests=check_consistency(estimate, consistency) if thorough else ConsistencyTests(),
         rejected=estimate.details.get("rejected_count"),
         outliers=outliers(estimate),
         modes=estimate.details.get("modes"),
@@ -142,3 +144,26 @@ def evaluate(name: str, estimate: Estimate, bounds: Bounds | None = None, *, tho
 def _spread(variances: np.ndarray[Any, Any]) -> float:
     """What an RMSE would be with these variances (K, d)."""
     return float(np.sqrt(variances.sum(axis=1).mean()))
+
+
+def numbers(model: Model, rows: Sequence[Row]) -> list[tuple[str, Array, dict[str, str]]]:
+    """Every number of the rows by the name that it has in JSON, NaN where it is not known, with its unit."""
+    records = [row.to_dict() for row in rows]
+    out: list[tuple[str, Array, dict[str, str]]] = []
+    for key in dict.fromkeys(key for record in records for key in record):
+        values = [record.get(key) for record in records]
+        if all(v is None or isinstance(v, bool | int | float) for v in values):
+            if not any(v is None for v in values) and isinstance(values[0], bool):
+                out.append((key, np.array(values, dtype=bool), {}))
+            else:
+                out.append((key, np.array([np.nan if v is None else v for v in values], dtype=float), _unit(model, key)))
+    return out
+
+
+def _unit(model: Model, key: str) -> dict[str, str]:
+    """The unit of a number of this name."""
+    for what in ("_rmse", "_crlb"):
+        group, found, _ = key.partition(what)
+        if found:
+            return {"units": unit_of(model.unit(s) for s in dict(model.groups).get(group, (group,)) if s in model.names)}
+    return {"units": "s"} if key in ("seconds", "convergence_time") else {}

@@ -16,11 +16,12 @@ from piazzi.model import Model
 from piazzi.problem.checks import Array
 
 _SHOWN = 0.1  # smallest component of a direction that is worth telling
-FEEBLE = 1.0  # singular value up to which the measurements tell less than the prior
-_LUCK = 0.999  # share of matched runs, of errors that never change their direction, that stay within what counts as attained
-_FAR = 5.0  # prior sigmas from which a twin is ruled out
+AS_THE_PRIOR = 1.0  # singular value up to which the measurements tell less than the prior
+# share of matched runs, of errors that never change their direction, that stay within what counts as attained
+_ATTAINED_PROBABILITY = 0.999
+_RULED_OUT = 5.0  # prior sigmas from which a twin is ruled out
 _LISTED = 4  # twins that are told one by one
-_ALIKE = 3.0  # difference of all measurements together, in sigma, that noise hides
+_WITHIN_NOISE = 3.0  # difference of all measurements together, in sigma, that noise hides
 
 
 def weakest(names: Sequence[str], direction: Array) -> dict[str, float]:
@@ -50,7 +51,7 @@ def local(
         show = display_of(model.unit(name), [s])
         sigmas.append(f"{name} {number(s * show.factor, 3)}{show.suffix}")
     smallest = float(found.singular_values[-1])
-    how = "to" if smallest > FEEBLE else "only to"
+    how = "to" if smallest > AS_THE_PRIOR else "only to"
     better = "" if since is None else f" From t = {since:g} s on they determine every direction better than the prior."
     return [
         f"Observability: the first state is observable from the measurements alone, condition {number(found.condition, 3)}; "
@@ -70,7 +71,7 @@ def twins_found(names: Sequence[str], twins: Sequence[Twin], count: int, *, cont
     for twin in twins[:_LISTED]:
         state = ", ".join(f"{name} {number(v, 4)}" for name, v in zip(names, twin.state, strict=True))
         exact = twin.misfit < 1e-6
-        hidden = twin.misfit * count**0.5 <= _ALIKE
+        hidden = twin.misfit * count**0.5 <= _WITHIN_NOISE
         what = "exactly the same measurements" if exact else "the same measurements to within their noise" if hidden else (
             f"nearly the same measurements (RMS difference {number(twin.misfit, 2)} sigma)"
         )  # fmt: skip
@@ -78,7 +79,7 @@ def twins_found(names: Sequence[str], twins: Sequence[Twin], count: int, *, cont
         out.append(f"Twin: {state} gives {what}{place}.")
     if len(twins) > _LISTED:
         out.append(f"And {len(twins) - _LISTED} more twins.")
-    far = [twin.prior_distance is not None and twin.prior_distance > _FAR for twin in twins]
+    far = [twin.prior_distance is not None and twin.prior_distance > _RULED_OUT for twin in twins]
     if all(far):
         out.append("Only the prior distinguishes the truth from a twin, and does so clearly.")
     return out
@@ -92,10 +93,10 @@ def conclusion(attempts: Sequence[Attempt], n: int, *, blind: bool) -> list[str]
     ekf, graph, ideal = tried["ekf"], tried["graph"], tried["ekf at the truth"]
     sizes = f"{_times(ekf.excess)} for the EKF, {_times(graph.excess)} for the factor graph"
     out = [f"Errors of the last half, from the same prior and measurements, in units of the best that is possible: {sizes}."]
-    stray = [a.estimator for a in (ekf, graph) if a.twin is not None]
-    attained = float(np.sqrt(quantile(_LUCK, n) / n))
-    if stray:
-        out.append(f"Verdict: a twin; {' and '.join(stray)} ended on its orbit.")
+    on_twin = [a.estimator for a in (ekf, graph) if a.twin is not None]
+    attained = float(np.sqrt(quantile(_ATTAINED_PROBABILITY, n) / n))
+    if on_twin:
+        out.append(f"Verdict: a twin; {' and '.join(on_twin)} ended on its orbit.")
     elif graph.excess <= attained < ekf.excess and ekf.excess > CLEARLY * graph.excess:
         out.append(
             "Verdict: linearisation. The information is there and the graph extracts it. The EKF does not because it takes its "

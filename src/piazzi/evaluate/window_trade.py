@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.evaluate.dataset import numbers
-from piazzi.evaluate.display import PASSED, row_display
+from piazzi.evaluate.comparison_table import PASSED, row_display
 from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
 from piazzi.evaluate.judgement import failing, tested
 from piazzi.evaluate.quantities import duration, ends, finite, ideal, number
-from piazzi.evaluate.rows import Row
+from piazzi.evaluate.rows import Row, numbers
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 

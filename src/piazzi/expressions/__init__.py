@@ -10,36 +10,20 @@ from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from piazzi.expressions.bounds import added, read
-from piazzi.expressions.errors import ExpressionError, quote
-from piazzi.expressions.functions import Function, arities
-from piazzi.expressions.language import CONSTANTS
+from piazzi.expressions.functions import Function, arities, symbol
+from piazzi.expressions.language import CONSTANTS, ExpressionError, quote
+from piazzi.expressions.limits import added, read
 from piazzi.expressions.numeric import evaluate, evaluate_arrays
 from piazzi.expressions.parse import Equation, is_name
-from piazzi.expressions.patience import TooSlowError, patiently
-from piazzi.expressions.symbolic import build, symbol
-from piazzi.expressions.writing import write
 from piazzi.text import suggest
 
 if TYPE_CHECKING:
     import sympy as sp
 
 __all__ = [
-    "CONSTANTS",
-    "FUNCTIONS",
-    "Equation",
-    "ExpressionError",
-    "Function",
-    "added",
-    "check",
-    "evaluate",
-    "evaluate_arrays",
-    "from_sympy",
-    "is_name",
-    "names",
-    "symbol",
-    "to_sympy",
-]
+    "CONSTANTS", "FUNCTIONS", "Equation", "ExpressionError", "Function", "added", "check", "evaluate", "evaluate_arrays",
+    "from_sympy", "is_name", "names", "symbol", "to_sympy",
+]  # fmt: skip
 
 #: The functions that an equation may call, and how many arguments each takes; `min` and `max` take that many or more.
 FUNCTIONS: Mapping[str, int] = MappingProxyType(arities())
@@ -78,9 +62,12 @@ def to_sympy(text: str, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
     ExpressionError
         As `check` does, where SymPy finds that a part has no finite real value, and where that takes it more than 5 s.
     """
+    from piazzi.expressions.symbolic import build
+    from piazzi.expressions.time_limit import TooSlowError, with_time_limit
+
     parsed = _read_with(text, symbols)
     try:
-        return patiently(lambda: build(parsed, symbols))
+        return with_time_limit(lambda: build(parsed, symbols))
     except TooSlowError as error:
         raise ExpressionError(f"{error}: write it in a simpler way", text) from None
 
@@ -96,6 +83,8 @@ def from_sympy(expr: object) -> str:
         If a part has no place in an equation (Piecewise, Derivative, a function of time, complex or infinite values, a
         matrix ...), or the text would exceed the limits of the language.
     """
+    from piazzi.expressions.writing import write
+
     return write(expr)
 
 

@@ -10,7 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import cache
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    import sympy as sp
 
 Growth = Literal["same", "magnitude", "root", "doubled", "logarithm", "exponential"]
 
@@ -142,6 +146,14 @@ TABLE: dict[str, Function] = {function.name: function for function in _ROWS}
 def arities() -> dict[str, int]:
     """The functions that an equation may call, and how many arguments each takes, or takes at least."""
     return {f.name: f.arity for f in TABLE.values() if not f.derived}
+
+
+@cache
+def symbol(name: str) -> sp.Symbol:
+    """Return the real SymPy symbol that stands for `name` everywhere."""
+    import sympy as sp
+
+    return sp.Symbol(name, real=True)
 
 
 def of_sympy(expr: Any) -> Function | None:

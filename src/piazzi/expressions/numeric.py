@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from piazzi.expressions.bounds import read
 from piazzi.expressions.functions import TABLE, Function
 from piazzi.expressions.language import CONSTANTS, Call, Name, Negative, Node, Number, Power, Product, Sum, fold
+from piazzi.expressions.limits import read
 
 
 class _Arithmetic(NamedTuple):

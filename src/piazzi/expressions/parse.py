@@ -19,7 +19,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from piazzi.expressions.errors import ExpressionError, quote
 from piazzi.expressions.functions import TABLE, arities
 from piazzi.expressions.language import (
     CONSTANTS,
@@ -28,6 +27,7 @@ from piazzi.expressions.language import (
     MAX_EXTREMES,
     MAX_LENGTH,
     Call,
+    ExpressionError,
     Name,
     Negative,
     Node,
@@ -35,8 +35,10 @@ from piazzi.expressions.language import (
     Power,
     Product,
     Sum,
+    Token,
+    quote,
+    tokenize,
 )
-from piazzi.expressions.tokens import Token, tokenize
 from piazzi.text import suggest
 
 ALIASES = {"ln": "log", "sgn": "sign", "fabs": "abs", "pow": "**"}

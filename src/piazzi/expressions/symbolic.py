@@ -7,22 +7,25 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from piazzi.expressions.bounds import MAX_EXPONENT, read
-from piazzi.expressions.errors import ExpressionError
-from piazzi.expressions.functions import TABLE, Function
-from piazzi.expressions.language import MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum, fold
+from piazzi.expressions.functions import TABLE, Function, symbol
+from piazzi.expressions.language import (
+    MAX_DIGITS,
+    Call,
+    ExpressionError,
+    Name,
+    Negative,
+    Node,
+    Number,
+    Power,
+    Product,
+    Sum,
+    fold,
+)
+from piazzi.expressions.limits import MAX_EXPONENT, read
 from piazzi.expressions.parse import Equation
 
 if TYPE_CHECKING:
     import sympy as sp
-
-
-@functools.cache
-def symbol(name: str) -> sp.Symbol:
-    """Return the real SymPy symbol that stands for `name` everywhere."""
-    import sympy as sp
-
-    return sp.Symbol(name, real=True)
 
 
 def build(equation: Equation, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:

@@ -7,10 +7,9 @@ import numbers
 from collections.abc import Iterable
 from typing import Any
 
-from piazzi.expressions.bounds import read
-from piazzi.expressions.errors import ExpressionError, quote
 from piazzi.expressions.functions import arities, of_sympy
-from piazzi.expressions.language import MAX_DIGITS, MAX_LENGTH
+from piazzi.expressions.language import MAX_DIGITS, MAX_LENGTH, ExpressionError, quote
+from piazzi.expressions.limits import read
 from piazzi.expressions.parse import is_name
 
 # How tightly a piece of text holds together: a looser piece goes into brackets inside a tighter one.

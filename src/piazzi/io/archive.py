@@ -13,8 +13,8 @@ from typing import IO, Any
 
 import numpy as np
 
+from piazzi.opening import opened
 from piazzi.problem.checks import Array
-from piazzi.sources import opened
 from piazzi.text import nearest, printable
 
 # An archive may hold this much, or this many times its own size if that is more: real measurements do not shrink further.

@@ -33,16 +33,16 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     special = _is_special(path)
     target = Path(path if special else os.path.realpath(path))
     if not special:
-        _sweep(str(target), os.getpid())
-    work, handle = _temporary(target) if special else _beside(target)
+        _remove_leftovers(str(target), os.getpid())
+    work, handle = _temporary(target) if special else _temporary_beside(target)
     try:
-        with _told(path, work):
+        with _naming(path, work):
             yield work
             if special:
                 with open(work, "rb") as source, open(target, "wb") as sink:
                     shutil.copyfileobj(source, sink)
             else:
-                _settle(work, target)
+                _replace(work, target)
     finally:
         with suppress(FileNotFoundError):
             work.unlink()
@@ -51,7 +51,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 @contextmanager
-def _told(path: str | os.PathLike[str], work: Path) -> Iterator[None]:
+def _naming(path: str | os.PathLike[str], work: Path) -> Iterator[None]:
     """What the system refuses of the temporary file, with the name that was asked for."""
     try:
         yield
@@ -62,7 +62,7 @@ def _told(path: str | os.PathLike[str], work: Path) -> Iterator[None]:
 
 
 @lru_cache(maxsize=1000)
-def _sweep(path: str, process: int) -> None:
+def _remove_leftovers(path: str, process: int) -> None:
     """Remove what killed writers of `path` left behind, once in a process: files of ours that no living process has locked."""
     target = Path(path)
     name = re.compile(re.escape(_prefix(target)) + r"[0-9a-f]{8}" + re.escape(target.suffix[-40:]))
@@ -127,7 +127,7 @@ def _temporary(target: Path) -> tuple[Path, None]:
     return Path(name), None
 
 
-def _beside(target: Path) -> tuple[Path, int | None]:
+def _temporary_beside(target: Path) -> tuple[Path, int | None]:
     """A new file in the same folder: private if it is to replace one, else with the permissions of all new files there.
 
     It gets those by being opened as any file is: to ask for the mask is to change it for a moment, in all threads.  The handle
@@ -146,19 +146,19 @@ def _beside(target: Path) -> tuple[Path, int | None]:
             os.close(handle)  # removed as one of a dead process, before it was locked
 
 
-def _settle(work: Path, target: Path) -> None:
+def _replace(work: Path, target: Path) -> None:
     """Put the finished file in the place of the one that it replaces, if it does, with its owner, permissions and links."""
     with open(work, "rb+") as file:
         os.fsync(file.fileno())
     old = target.stat() if target.exists() else None
-    if old is not None and not (old.st_nlink == 1 and _like(work, old)):
+    if old is not None and not (old.st_nlink == 1 and _copy_owner(work, old)):
         _write_through(work, target)
         return
     os.replace(work, target)
     sync_folder(target)
 
 
-def _like(work: Path, old: os.stat_result) -> bool:
+def _copy_owner(work: Path, old: os.stat_result) -> bool:
     """Give a file the owner and the permissions of another, but no rights to run as its owner; whether that can be done."""
     new = work.stat()
     try:

@@ -11,9 +11,9 @@ from math import nan
 
 import numpy as np
 
+from piazzi.opening import opened
 from piazzi.problem.checks import Array
-from piazzi.scenarios.faults import shown
-from piazzi.sources import opened
+from piazzi.scenarios.table import shown
 
 STATION = "station"
 MAX_BYTES = 2**32

@@ -16,7 +16,7 @@ from piazzi.io.atomic import atomic_path
 from piazzi.io.cells import STATION, Cells, read_cells
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, backwards, check_span
-from piazzi.text import nearest, restored, unformulated
+from piazzi.text import escape_formula, nearest, unescape_formula
 from piazzi.units import Unit, Units
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def write_csv(path: str | os.PathLike[str], problem: Problem, tracking: Tracking
     station, values = tracking.stations_of(problem), tracking.padded(problem.model.width)
     header, columns = [TIME], [_written(tracking.row_times)]
     if tracking.row_stations is not None:
-        cells = {name: unformulated(str(name)) for name in dict.fromkeys(np.asarray(tracking.row_stations).tolist())}
+        cells = {name: escape_formula(str(name)) for name in dict.fromkeys(np.asarray(tracking.row_stations).tolist())}
         header, columns = [*header, STATION], [*columns, [cells[name] for name in np.asarray(tracking.row_stations).tolist()]]
     for name, column in _components(problem, station, values).items():
         header, columns = [*header, name], [*columns, _written(column)]
@@ -134,7 +134,7 @@ def _in_own_units(cells: Cells, problem: Problem) -> Cells:
             raise ValueError(f"two columns are called {label!r}")
         with np.errstate(over="ignore"):
             numbers[label] = column if factor == 1.0 else column * factor
-    return Cells(cells.comments, numbers, cells.station, tuple(map(restored, cells.station_names)), cells.lines)
+    return Cells(cells.comments, numbers, cells.station, tuple(map(unescape_formula, cells.station_names)), cells.lines)
 
 
 def _factor(column: str, label: str, text: str, problem: Problem) -> float:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from piazzi.io.atomic import atomic_path, check_writable
+from piazzi.opening import opened as opened_file
 from piazzi.problem.checks import Array
-from piazzi.sources import opened as opened_file
 from piazzi.text import one_line
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"

@@ -20,8 +20,7 @@ from piazzi.estimate.estimator import View
 from piazzi.io import hdf5
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
-from piazzi.scenarios.faults import Faults, shown
-from piazzi.scenarios.table import Table
+from piazzi.scenarios.table import Faults, Table, shown
 from piazzi.scenarios.write import problem_from_tables, problem_to_tables
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, TypeVar
 
-from piazzi.expressions import patience
+from piazzi.expressions import time_limit
 from piazzi.expressions.functions import of_sympy
-from piazzi.expressions.patience import TooSlowError, each_patiently, patiently
+from piazzi.expressions.time_limit import TooSlowError, each_with_time_limit, with_time_limit
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -189,7 +189,7 @@ def function(
 def in_time(called: Callable[[int], str], write: Callable[[A], T], items: Sequence[A]) -> list[T]:
     """What is written for each item; raises ValueError, with what the item is `called`, where SymPy takes too long for it."""
     try:
-        return each_patiently(write, items) if items else []
+        return each_with_time_limit(write, items) if items else []
     except TooSlowError as error:
         raise ValueError(f"code of {called(error.at)}: {error}") from None
 
@@ -209,7 +209,7 @@ def _written(writer: _Writer, outputs: Sequence[sp.Expr], called: Sequence[str])
     """Texts of the outputs, their common parts written before."""
     equations = list(dict.fromkeys(called))
     try:
-        shared, reduced = patiently(lambda: _common(outputs), patience.SECONDS * max(len(equations), 1))
+        shared, reduced = with_time_limit(lambda: _common(outputs), time_limit.SECONDS * max(len(equations), 1))
     except TooSlowError as error:
         raise ValueError(f"code of {', '.join(equations)}: {error}") from None
     rows = [[e for _, e in row] for _, row in groupby(zip(called, reduced, strict=True), key=lambda output: output[0])]

@@ -8,9 +8,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 from piazzi.expressions import symbol, to_sympy
-from piazzi.expressions.patience import TooSlowError, each_patiently
-from piazzi.model.definitions import Definitions, needed
-from piazzi.model.naming import STEP, TIME
+from piazzi.expressions.time_limit import TooSlowError, each_with_time_limit
+from piazzi.model.definitions import STEP, TIME, Definitions, needed
 from piazzi.model.sensor import Parameter, Sensor
 
 if TYPE_CHECKING:
@@ -180,7 +179,7 @@ def jacobian(f: sp.Matrix, x: Sequence[sp.Symbol]) -> sp.Matrix:
         return real.jacobian(list(x)).replace(Magnitude, sp.Abs).replace(Sign, sp.sign)
 
     try:
-        rows = each_patiently(row, range(f.rows))
+        rows = each_with_time_limit(row, range(f.rows))
     except TooSlowError as error:
         raise ValueError(f"derivatives of equation {error.at + 1}: {error}") from None
     return sp.Matrix(f.rows, len(x), [entry for found in rows for entry in found])

@@ -8,9 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from piazzi.expressions import names
-from piazzi.model.definitions import definitions_of, needed, unused
-from piazzi.model.naming import STEP, TIME, name_of, text_of
-from piazzi.model.sensor import Parameter, Sensor, several
+from piazzi.model.definitions import STEP, TIME, definitions_of, name_of, needed, text_of, unused
+from piazzi.model.sensor import Parameter, Sensor, as_tuple
 from piazzi.text import nearest
 
 
@@ -69,7 +68,7 @@ class Model:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "states", tuple(name_of(s, "state") for s in several(self.states, "states")))
+        put(self, "states", tuple(name_of(s, "state") for s in as_tuple(self.states, "states")))
         put(self, "parameters", tuple(_parameter(p) for p in _items(self.parameters)))
         put(self, "sensors", self._sensors())
         remembered = tuple((name_of(k, "memory"), str(v)) for k, v in dict(self.memory).items())
@@ -99,7 +98,7 @@ class Model:
             if missing:
                 raise ValueError(f"dynamics has no equation for state {missing[0]!r}")
             given = tuple(by_name[s] for s in self.states)
-        equations = tuple(text_of(e) for e in several(given, "dynamics"))
+        equations = tuple(text_of(e) for e in as_tuple(given, "dynamics"))
         if len(equations) != len(self.states):
             raise ValueError(
                 f"dynamics has {len(equations)} equations for {len(self.states)} states ({', '.join(self.states)})"
@@ -242,7 +241,7 @@ class Model:
 def _items(parameters: Any) -> list[Any]:
     if isinstance(parameters, Mapping):
         return [Parameter(name_of(k, "parameter"), v) for k, v in parameters.items()]
-    return list(several(parameters, "parameters"))
+    return list(as_tuple(parameters, "parameters"))
 
 
 def _parameter(given: Any) -> Parameter:

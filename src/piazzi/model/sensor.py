@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from piazzi.model.definitions import definitions_of, needed, unused
-from piazzi.model.naming import name_of, text_of
+from piazzi.model.definitions import definitions_of, name_of, needed, text_of, unused
 
 Role = Literal["fixed", "estimated", "considered"]
 
 
-def several(given: Any, what: str) -> tuple[Any, ...]:
+def as_tuple(given: Any, what: str) -> tuple[Any, ...]:
     """The given names as a tuple; raises ValueError for one text, whose letters would be taken for names."""
     if isinstance(given, str):
         raise ValueError(f"{what} is {given!r}; it must be a list, such as [{given!r}]")
@@ -85,7 +84,7 @@ class Sensor:
         put = object.__setattr__
         put(self, "name", str(self.name))
         name_of(self.name.replace("-", "_"), "sensor")
-        put(self, "angles", several(self.angles, f"sensor {self.name!r}: angles"))
+        put(self, "angles", as_tuple(self.angles, f"sensor {self.name!r}: angles"))
         labelled = self._labelled()
         if not labelled:
             raise ValueError(f"sensor {self.name!r} has no equations")

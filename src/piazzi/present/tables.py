@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from piazzi.estimate import Estimate, Forecast
+from piazzi.evaluate.grids import rich_table
 from piazzi.evaluate.metrics import errors, residual_rms
 from piazzi.evaluate.quantities import display_of, duration, number, with_sigma
 from piazzi.problem import Problem, Tracking
@@ -50,19 +52,14 @@ def _count(many: int, what: str) -> str:
 
 def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
     """A rich table of every state at epoch `k` with its standard deviation, and its error where the truth is known."""
-    from rich import box
     from rich.console import Group
-    from rich.table import Table
     from rich.text import Text
 
     error = errors(estimate)
     view = "with later measurements too" if estimate.view == "delayed" else "from measurements up to then"
     title = f"State at t = {estimate.times[k]:g} s, {name}, {view}"
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column("state", no_wrap=True)
-    for heading in ("estimate", "sigma", *(["error"] if error is not None else [])):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
+    heads = ("state", "estimate", "sigma", *(["error"] if error is not None else []), "unit")
+    rows = []
     sigmas = np.sqrt(np.maximum(np.diagonal(estimate.covariance[k]), 0.0))
     for i, state in enumerate(estimate.names):
         value, sigma = float(estimate.mean[k, i]), float(sigmas[i])
@@ -71,20 +68,25 @@ def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
         if error is not None:
             e = float(error[k, i]) * show.factor
             texts.append(with_sigma(e, sigma * show.factor)[0] if np.isfinite(e) else "-")
-        table.add_row(Text(state), *texts, Text(printable(show.unit)))
-    return Group(Text(printable(title), style="bold"), table)
+        rows.append((state, *texts, printable(show.unit)))
+    return Group(Text(printable(title), style="bold"), _table(heads, rows))
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
+    """A rich table of states and numbers."""
+    return rich_table([(head, head in ("state", "true state", "unit")) for head in heads], rows)
 
 
 def solver_line(estimate: Estimate) -> list[str]:
     """How an optimisation ended, for estimators that tell of one: its solver, start, cost, gradient and dynamics defect."""
-    told = estimate.details
-    if not {"solver", "start", "cost"} <= told.keys():
+    details = estimate.details
+    if not {"solver", "start", "cost"} <= details.keys():
         return []
-    numbers = [f"cost {told['cost']:.6g}"]
-    numbers += [f"gradient {told['gradient_norm']:.1g}"] if "gradient_norm" in told else []
-    numbers += [f"dynamics defect {told['defect']:.1g} sigma"] if "defect" in told else []
+    numbers = [f"cost {details['cost']:.6g}"]
+    numbers += [f"gradient {details['gradient_norm']:.1g}"] if "gradient_norm" in details else []
+    numbers += [f"dynamics defect {details['defect']:.1g} sigma"] if "defect" in details else []
     steps = f"{estimate.iterations} iteration{'s' * (estimate.iterations != 1)}"
-    return [f"Solver {told['solver']}, started from {told['start']}: {steps}, {', '.join(numbers)}"]
+    return [f"Solver {details['solver']}, started from {details['start']}: {steps}, {', '.join(numbers)}"]
 
 
 def residual_line(estimate: Estimate) -> list[Any]:
@@ -101,39 +103,27 @@ def residual_line(estimate: Estimate) -> list[Any]:
 
 def forecast_table(name: str, forecast: Forecast) -> Any:
     """A rich table of every state at each predicted time: value, sigma, and that over the one at the last epoch."""
-    from rich import box
     from rich.console import Group
-    from rich.table import Table
     from rich.text import Text
 
     title = f"Predicted from t = {forecast.start:g} s, {name}, without measurements"
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    for heading in ("ahead", "state", "estimate", "sigma", "growth", "unit"):
-        table.add_column(heading, justify="left" if heading in ("state", "unit") else "right", no_wrap=True)
+    rows = []
     shows = [display_of(forecast.problem.model.unit(s), forecast.mean[:, i].tolist()) for i, s in enumerate(forecast.names)]
     for k, t in enumerate(forecast.times.tolist()):
         for i, (state, show) in enumerate(zip(forecast.names, shows, strict=True)):
             ahead = duration(t - forecast.start) if i == 0 else ""
             value, sigma = (float(a[k, i]) * show.factor for a in (forecast.mean, forecast.sigma))
             growth = f"{number(float(forecast.growth[k, i]), 3)}x"
-            table.add_row(ahead, Text(state), *with_sigma(value, sigma), growth, Text(printable(show.unit)))
-    return Group(Text(printable(title), style="bold"), table)
+            rows.append((ahead, state, *with_sigma(value, sigma), growth, printable(show.unit)))
+    return Group(Text(printable(title), style="bold"), _table(("ahead", "state", "estimate", "sigma", "growth", "unit"), rows))
 
 
 def truth_table(problem: Problem, tracking: Tracking) -> Any:
     """A rich table of the true state at the first and last epoch."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column("true state", no_wrap=True)
-    for t in (tracking.times[0], tracking.times[-1]):
-        table.add_column(f"t = {t:g} s", justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
+    rows = []
     if tracking.truth is not None:
         for i, state in enumerate(problem.model.names[: tracking.truth.shape[1]]):
             ends = [float(tracking.truth[0, i]), float(tracking.truth[-1, i])]
             show = display_of(problem.model.unit(state), ends)
-            table.add_row(Text(state), *(number(v * show.factor, 6) for v in ends), Text(printable(show.unit)))
-    return table
+            rows.append((state, *(number(v * show.factor, 6) for v in ends), printable(show.unit)))
+    return _table(("true state", *(f"t = {t:g} s" for t in (tracking.times[0], tracking.times[-1])), "unit"), rows)

@@ -73,7 +73,7 @@ def with_gauss_markov(
         prior=Gaussian([*problem.prior.mean, *np.zeros(len(driven))], prior),
         process_noise=replace(noise, covariance=density),
         parameters={**problem.parameters, parameter: float(time_constant)},
-        truth=None if problem.truth is None else _calm(problem, problem.truth, model, len(driven)),
+        truth=None if problem.truth is None else _undisturbed(problem, problem.truth, model, len(driven)),
     )
 
 
@@ -127,7 +127,7 @@ def _continued(problem: Problem, covariance: Array, model: Model, variances: Arr
     return out
 
 
-def _calm(problem: Problem, truth: Truth, model: Model, count: int) -> Truth:
+def _undisturbed(problem: Problem, truth: Truth, model: Model, count: int) -> Truth:
     """The truth, undisturbed by the new states."""
     state = None if truth.state is None else [*numeric(truth.state, "true state").reshape(-1), *np.zeros(count)]
     noise = truth.process_noise

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from piazzi.kernels import Ready, ready
 from piazzi.problem.checks import Array
 from piazzi.problem.problem import Problem
 from piazzi.problem.tracking import Tracking
+
+_PREPARED: WeakKeyDictionary[Tracking, tuple[Problem, Inputs]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +80,9 @@ class Inputs:
 def prepare(problem: Problem, tracking: Tracking) -> Inputs:
     """Check that the tracking fits the problem and lay both out, once; raises ValueError where it does not fit.
 
-    The tracking keeps what was laid out for the last problem: estimators that are compared share it.
+    What was laid out for the last problem is kept as long as the tracking is: estimators that are compared share it.
     """
-    kept: tuple[Problem, Inputs] | None = tracking.__dict__.get("_prepared")
+    kept = _PREPARED.get(tracking)
     if kept is None or kept[0] is not problem:
         station = tracking.stations_of(problem)
         start, count, scale = problem.intervals(tracking.times)
@@ -87,7 +90,7 @@ def prepare(problem: Problem, tracking: Tracking) -> Inputs:
         _check_resolved(problem, tracking, station, z)
         inputs = Inputs(tracking.times, start, count, scale, tracking.first_row, z, station)
         inputs.run_of(problem)
-        kept = tracking.__dict__["_prepared"] = problem, inputs
+        kept = _PREPARED[tracking] = problem, inputs
     return kept[1]
 
 

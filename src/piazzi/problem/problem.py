@@ -12,9 +12,8 @@ import numpy as np
 
 from piazzi.kernels import Discrete, Integrator, Kepler, KernelSpec, RungeKutta4
 from piazzi.model import Model
-from piazzi.problem import functions, manoeuvres
+from piazzi.problem import evaluation, manoeuvres
 from piazzi.problem.checks import Array, check_span, covariance, finite_vector, frozen, lock, numeric
-from piazzi.problem.composition import composed
 from piazzi.problem.constants import with_station_constants
 from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
 from piazzi.problem.two_body import check_orbit_axes, check_two_body
@@ -168,7 +167,7 @@ class Problem:
 
     def _check_regular(self) -> None:
         """Refuse a prior mean at which an equation has no value, such as the centre of attraction."""
-        where = functions.singular_equation(self.model, self.stations, self._values(), self.prior_time or 0.0)
+        where = evaluation.singular_equation(self.model, self.stations, self._values(), self.prior_time or 0.0)
         if where:
             raise ValueError(where)
 
@@ -274,7 +273,7 @@ class Problem:
         key = (fragments, lanes)
         spec = self.specs.get(key)
         if spec is None:
-            parts = composed(
+            parts = evaluation.fragments_of(
                 fragments,
                 self.integrator,
                 manoeuvres=bool(self.manoeuvres),
@@ -349,24 +348,24 @@ class Problem:
 
     def dynamics(self, x: Any, t: Any = 0.0) -> Array:
         """dx/dt at one state (n,) or many (K, n), same shape."""
-        return functions.rates(self.spec("transition", "rates"), "evaluate_dynamics", self.given, x, t)
+        return evaluation.rates(self.spec("transition", "rates"), "evaluate_dynamics", self.given, x, t)
 
     def dynamics_jacobian(self, x: Any, t: Any = 0.0) -> Array:
         """F = df/dx at one state (n, n) or many (K, n, n)."""
-        return functions.rates(self.spec("transition", "rates"), "evaluate_dynamics_jacobian", self.given, x, t)
+        return evaluation.rates(self.spec("transition", "rates"), "evaluate_dynamics_jacobian", self.given, x, t)
 
     def step(self, x: Any, dt: float, t: Any = 0.0) -> tuple[Array, Array]:
         """The state `dt` seconds later and the derivative of that step, shapes (n,), (n, n) or (K, n), (K, n, n)."""
         assert self.integrator is not None
-        return functions.step(self.spec("transition", "functions"), self.integrator, self.given, x, dt, t)
+        return evaluation.step(self.spec("transition", "functions"), self.integrator, self.given, x, dt, t)
 
     def measure(self, station: str, x: Any, t: Any = 0.0) -> Array:
         """Noiseless measurement h of a station, (m,) or (K, m)."""
-        return functions.measure(*self._measured(station), self.given, x, t)
+        return evaluation.measure(*self._measured(station), self.given, x, t)
 
     def measurement_jacobian(self, station: str, x: Any, t: Any = 0.0) -> Array:
         """H = dh/dx of a station, (m, n) or (K, m, n)."""
-        return functions.measurement_jacobian(*self._measured(station), self.given, x, t)
+        return evaluation.measurement_jacobian(*self._measured(station), self.given, x, t)
 
     def _measured(self, station: str) -> tuple[KernelSpec, int, Array, int]:
         """Compiled module, index of the sensor, own numbers and number of components of a station."""

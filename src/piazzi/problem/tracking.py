@@ -61,10 +61,6 @@ class Tracking:
         if self.truth is not None:
             put(self, "truth", self._checked_truth())
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Without what `prepare` keeps: it belongs to one problem in one process."""
-        return {name: value for name, value in self.__dict__.items() if name != "_prepared"}
-
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Nothing can be written into a copy either, so that what `prepare` keeps of it stays right."""
         self.__dict__.update(state)

@@ -9,9 +9,8 @@ from typing import Any, get_args
 
 from piazzi.expressions import check
 from piazzi.model import STEP, TIME, Model, Parameter, Role, Sensor
-from piazzi.model.naming import name_of
-from piazzi.scenarios.faults import shown
-from piazzi.scenarios.table import Table
+from piazzi.model.definitions import name_of
+from piazzi.scenarios.table import Table, shown
 from piazzi.text import nearest
 from piazzi.units import ONE, Unit, Units
 

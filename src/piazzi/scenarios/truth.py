@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any, Literal
+
 import numpy as np
 
 from piazzi.expressions import check
-from piazzi.problem import Gaussian, ProcessNoise, Truth
+from piazzi.problem import Gaussian, Problem, ProcessNoise, Truth
 from piazzi.scenarios.equations import Physics
-from piazzi.scenarios.faults import joined, shown
-from piazzi.scenarios.integrators import read_integrator
-from piazzi.scenarios.manoeuvres import read_manoeuvres
-from piazzi.scenarios.quantities import read_noise
-from piazzi.scenarios.table import Table
+from piazzi.scenarios.motion import read_integrator, read_manoeuvres
+from piazzi.scenarios.table import Table, joined
+from piazzi.scenarios.values import read_noise
 from piazzi.text import nearest
 from piazzi.units import Units
-
-MOST_TEXTS = 100
 
 
 def read_truth(table: Table, physics: Physics, prior: Gaussian | None, units: Units) -> Truth | None:
@@ -37,23 +36,13 @@ def read_truth(table: Table, physics: Physics, prior: Gaussian | None, units: Un
     integrator = read_integrator(table.table("integrator"), units)
     noisy = table.flag("measurement_noise", True)
     manoeuvres = read_manoeuvres(table, physics, units) if "manoeuvres" in table else None
-    accept = read_texts(table, "accept")
+    accept = table.texts("accept")
     known = [*physics.units]
     for i, text in enumerate(accept):
         with table.faults.at(joined(table.at("accept"), i)):
             check(text, known)
     table.finish()
     return Truth(mean, parameters, noise, integrator, bool(noisy), manoeuvres, accept)
-
-
-def read_texts(table: Table, key: str) -> tuple[str, ...]:
-    """One text, or a list of them."""
-    value = table.raw(key)
-    texts = [] if value is None else value if isinstance(value, list) else [value]
-    if not all(isinstance(text, str) for text in texts) or len(texts) > MOST_TEXTS:
-        table.fault(key, f"must be text, or a list of at most {MOST_TEXTS} texts, not {shown(value)}")
-        return ()
-    return tuple(texts)
 
 
 def _true_parameters(table: Table, physics: Physics) -> dict[str, float]:
@@ -66,3 +55,49 @@ def _true_parameters(table: Table, physics: Physics) -> dict[str, float]:
         value = table.number(name, physics.units[name].factor)
         out |= {} if value is None else {name: value}
     return out
+
+
+def vary(
+    problem: Problem, *, truth: Literal["fixed", "drawn"] | None = None, perfect_guess: bool = False, noiseless: bool = False
+) -> Problem:
+    """The problem with another truth half.
+
+    Parameters
+    ----------
+    truth : "fixed" or "drawn", optional
+        Where the truth starts: where the problem says or else at the prior's mean; or drawn from the prior.
+    perfect_guess : bool
+        The prior's mean is the true first state: a fixed one becomes the mean; a drawn one gives way to the mean.
+    noiseless : bool
+        Sensors without error.  What the estimators assume about them stays.
+
+    Raises
+    ------
+    ValueError
+        For another `truth`.
+    """
+    if truth not in (None, "fixed", "drawn"):
+        raise ValueError(f"truth is {truth!r}; it must be 'fixed' or 'drawn'")
+    half = problem.truth or Truth()
+    if truth == "drawn":
+        half = replace(half, state=None)
+    elif truth == "fixed" and half.state is None:
+        half = replace(half, state=problem.prior.mean)
+    if noiseless:
+        half = replace(half, measurement_noise=False)
+    return _with_perfect_guess(problem, half) if perfect_guess else replace(problem, truth=half)
+
+
+def _with_perfect_guess(problem: Problem, half: Truth) -> Problem:
+    state = problem.prior.mean if half.state is None else half.state
+    guesses: dict[str, Any] = dict(problem.parameters)
+    true = dict(half.parameters)
+    for name in problem.model.constants:
+        true.setdefault(name, float(guesses[name].mean[0]))
+        guesses[name] = Gaussian([true[name]], guesses[name].covariance)
+    return replace(
+        problem,
+        prior=Gaussian(state, problem.prior.covariance),
+        parameters=guesses,
+        truth=replace(half, state=state, parameters=true),
+    )

@@ -9,11 +9,9 @@ import numpy as np
 
 from piazzi.model import Model, Parameter, Sensor
 from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Truth
-from piazzi.scenarios.faults import Faults, ScenarioError
-from piazzi.scenarios.integrators import write_integrator
-from piazzi.scenarios.manoeuvres import write_manoeuvre
-from piazzi.scenarios.read import read_problem
-from piazzi.scenarios.table import Table
+from piazzi.scenarios.loader import read_problem
+from piazzi.scenarios.motion import write_integrator, write_manoeuvre
+from piazzi.scenarios.table import Faults, ScenarioError, Table
 from piazzi.units import Labels
 
 SECTIONS = (

@@ -58,7 +58,7 @@ class Cluster:
             raise ValueError(
                 "--scheduler needs Dask, which is not installed: pip install 'piazzi[cluster]', here and on the workers"
             ) from None
-        _quiet()
+        _silence_dask()
         self._study, self._here = pickle.dumps(study), fingerprint()
         self._futures: dict[str, tuple[Future, Task]] = {}
         self._done: SimpleQueue[str] = SimpleQueue()
@@ -80,11 +80,11 @@ class Cluster:
         """Threads of all workers there are, asked for again every few seconds."""
         if time.monotonic() > self._counted + COUNT_SECONDS:
             try:
-                self._slots = max(1, int(sum(_within(self._silence, self._client.nthreads).values())))
+                self._slots = max(1, int(sum(_with_timeout(self._silence, self._client.nthreads).values())))
             except TimeoutError:
-                self._gone(f"has not answered for {self._silence:g} s")
+                self._raise_lost(f"has not answered for {self._silence:g} s")
             except OSError:
-                self._gone()
+                self._raise_lost()
             self._counted = time.monotonic()
         return self._slots
 
@@ -135,7 +135,7 @@ class Cluster:
             return Outcome(task, error=f"{type(error).__name__}: {' '.join(str(error).split())}")
         if isinstance(result, Piece):
             return Outcome(task, result)
-        return Outcome(task, error=str(result), hopeless=True)
+        return Outcome(task, error=str(result), fatal=True)
 
     def _lost(self, task: Task) -> Outcome | None:
         """The same where a task was finished and its results are not to be had: the worker is gone, or the scheduler is."""
@@ -147,7 +147,7 @@ class Cluster:
 
     def _check_connected(self) -> None:
         if self._client.status not in ("running", "connecting"):
-            self._gone()
+            self._raise_lost()
 
     def _check_answers(self) -> None:
         """Raise where the scheduler, asked for as long as it may be silent, says nothing: it is stopped, or out of reach."""
@@ -155,26 +155,26 @@ class Cluster:
         while True:
             self._check_connected()
             try:
-                _knock(self.address)
+                _check_reachable(self.address)
             except ConnectionError:
                 if time.monotonic() < end:
                     continue
-                self._gone(f"has not answered for {self._silence:g} s")
+                self._raise_lost(f"has not answered for {self._silence:g} s")
             self._heard = time.monotonic()
             return
 
-    def _gone(self, how: str = "is gone") -> NoReturn:
+    def _raise_lost(self, how: str = "is gone") -> NoReturn:
         raise ConnectionError(f"the scheduler at {self.address} {how}; what was finished is kept")
 
 
-def _quiet() -> None:
+def _silence_dask() -> None:
     """Leave it to this module to say what is wrong: Dask gives loggers below its first levels of their own."""
     known = [name for name in logging.root.manager.loggerDict if name.startswith("distributed.")]
     for name in ("distributed", "tornado.application", "asyncio", *known):
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-def _within(seconds: float, call: Callable[..., T], *arguments: Any) -> T:
+def _with_timeout(seconds: float, call: Callable[..., T], *arguments: Any) -> T:
     """What a call returns that may never return; raises TimeoutError where it takes longer."""
     results: SimpleQueue[tuple[bool, Any]] = SimpleQueue()
 
@@ -211,7 +211,7 @@ def _local(workers: int | None) -> Any:
 def _client(address: str) -> Client:
     from distributed import Client
 
-    _knock(address)
+    _check_reachable(address)
     client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     try:
         client.wait_for_workers(1, timeout=WORKERS_SECONDS)
@@ -221,7 +221,7 @@ def _client(address: str) -> Client:
     return client
 
 
-def _knock(address: str) -> None:
+def _check_reachable(address: str) -> None:
     """Raise unless something at the address speaks Dask's protocol: a client that cannot connect takes long to give up."""
     import asyncio
     from concurrent.futures import ThreadPoolExecutor
@@ -246,7 +246,7 @@ def _knock(address: str) -> None:
 
 def _check_versions(client: Client, address: str, here: dict[str, str], silence: float) -> None:
     try:
-        there: dict[str, dict[str, str]] = _within(silence, client.run, fingerprint)
+        there: dict[str, dict[str, str]] = _with_timeout(silence, client.run, fingerprint)
     except TimeoutError:
         raise ConnectionError(f"a worker of {address}, or the scheduler, has not answered for {silence:g} s") from None
     except Exception as error:

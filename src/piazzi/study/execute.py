@@ -12,7 +12,7 @@ from piazzi.io.atomic import check_writable
 from piazzi.scenarios import load_scenario
 from piazzi.study.log import ENDING, Log
 from piazzi.study.plan import Plan
-from piazzi.study.pool import Here, Processes, Workers, processors
+from piazzi.study.pool import Processes, ThisProcess, Workers, processors
 from piazzi.study.resume import checks, difference
 from piazzi.study.runner import Progress, Runner
 from piazzi.study.store import Stored, read_store
@@ -103,14 +103,14 @@ def run_study(
         raise ValueError(f"{os.fspath(path)}: a study is kept in a .nc file")
     check_writable(store)
     finished = _finished(study, store, resume)
-    beside = store.with_name(store.name + ENDING)
+    log_path = store.with_name(store.name + ENDING)
     if finished is not None:
-        if beside.exists():  # its end came between the two
-            beside.unlink()
+        if log_path.exists():  # its end came between the two
+            log_path.unlink()
         return finished
-    log = _log(study, beside, resume)
+    log = _log(study, log_path, resume)
     try:
-        team = _team(study, workers, scheduler)
+        team = _workers(study, workers, scheduler)
         try:
             import_module("h5netcdf")  # now, while the workers start, and not when everybody waits for the file
             Runner(study, log, team, chunk, progress).run()
@@ -157,11 +157,11 @@ def _log(study: Plan, path: Path, resume: bool) -> Log:
     return Log.open(path, partial(checks, study, path))
 
 
-def _team(study: Plan, workers: int | None, scheduler: str | None) -> Workers:
+def _workers(study: Plan, workers: int | None, scheduler: str | None) -> Workers:
     if scheduler is not None:
         from piazzi.study.cluster import Cluster
 
         return Cluster(study, scheduler, workers)
     if workers == 0:
-        return Here(study)
+        return ThisProcess(study)
     return Processes(study, workers or processors())

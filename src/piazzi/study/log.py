@@ -106,9 +106,9 @@ class Log:
         while True:
             found = _read(file, body=False)
             if found is None:
-                behind = _behind(file, end)
+                behind = _next_record(file, end)
                 if behind is None:
-                    damaged += not _is_torn(file, end)
+                    damaged += not _is_incomplete(file, end)
                     break
                 damaged += 1
                 end = file.seek(behind)  # its runs are missing, so they are computed again
@@ -216,7 +216,7 @@ def _read(file: IO[bytes], body: bool = True) -> _Record | None:
     return _Record(header if isinstance(header, dict) else {}, b"".join(parts), behind)
 
 
-def _behind(file: IO[bytes], start: int) -> int | None:
+def _next_record(file: IO[bytes], start: int) -> int | None:
     """Where the next whole record after a damaged one at `start` begins; None where there is none.
 
     What is damaged may be its length, so the next one is looked for by its first bytes.
@@ -237,7 +237,7 @@ def _behind(file: IO[bytes], start: int) -> int | None:
         at += found + 1
 
 
-def _is_torn(file: IO[bytes], start: int) -> bool:
+def _is_incomplete(file: IO[bytes], start: int) -> bool:
     """Whether what is left from `start` on is a record that was not written to its end, or nothing at all."""
     file.seek(start)
     head, left = file.read(_HEAD.size), os.fstat(file.fileno()).st_size - start

@@ -16,7 +16,7 @@ from piazzi.study.bound import bound_at, no_bound
 from piazzi.study.lanes import compiles, filter_runs
 from piazzi.study.plan import Plan
 from piazzi.study.runs import Runs, simulated
-from piazzi.study.score import NUMBERS, Scored, nothing, score_estimate, score_lanes
+from piazzi.study.score import NUMBERS, Scored, empty_scores, score_estimate, score_lanes
 from piazzi.study.tasks import Piece, Task, joined
 
 LOGGER = logging.getLogger("piazzi.study")
@@ -35,11 +35,11 @@ def run_task(study: Plan, task: Task) -> Piece:
     )
 
 
-def lost(study: Plan, task: Task, message: str) -> Piece:
+def failed_piece(study: Plan, task: Task, message: str) -> Piece:
     """A piece without results, each of whose runs failed with this message; for a bound, one that is not known, and why."""
     if not task.count:
         return Piece(task, no_bound(study), ((-1, -1, message),))
-    found = [(nothing(task.count, len(study.groups), len(study.kept)), [message] * task.count) for _ in study.rows]
+    found = [(empty_scores(task.count, len(study.groups), len(study.kept)), [message] * task.count) for _ in study.rows]
     return _piece(task, found)
 
 
@@ -69,9 +69,9 @@ def _estimated(study: Plan, label: str, estimator: Any, runs: Runs) -> list[tupl
     """Scores and messages of every view of one estimator."""
     views = views_of(estimator)
     M, G, T = len(runs.truth), len(study.groups), len(study.kept)
-    found = [(nothing(M, G, T), list(runs.wrong)) for _ in views]
+    found = [(empty_scores(M, G, T), list(runs.wrong)) for _ in views]
     left = [i for i in range(M) if not runs.wrong[i]]
-    if _filters_in_lanes(estimator, runs.belief):
+    if _filters_in_lanes(estimator, runs.assumed):
         left = _filter(study, runs, left, found[0][0])
     for i in left:
         for view, (scored, message) in _one(study, label, estimator, runs, i).items():
@@ -82,16 +82,16 @@ def _estimated(study: Plan, label: str, estimator: Any, runs: Runs) -> list[tupl
     return found
 
 
-def _filters_in_lanes(estimator: Any, belief: Problem) -> bool:
+def _filters_in_lanes(estimator: Any, assumed: Problem) -> bool:
     plain = type(estimator) is ExtendedKalmanFilter and estimator.guard is None and estimator.update != "joint"
-    return plain and belief.runs_in_lanes and not belief.considered and prior_ratio(belief) <= DIFFUSE
+    return plain and assumed.runs_in_lanes and not assumed.considered and prior_ratio(assumed) <= DIFFUSE
 
 
 def _filter(study: Plan, runs: Runs, left: list[int], out: Scored) -> list[int]:
     """Put the scores of the extended Kalman filter of these runs in place; returns the runs that need a closer look."""
     if not left:
         return []
-    layout = runs.believed
+    layout = runs.assumed_layout
     if not compiles(filter_runs, layout, runs.z[left[:1]], runs.truth[left[:1]]):
         return left
     whole = len(left) == len(runs.truth)
@@ -102,7 +102,7 @@ def _filter(study: Plan, runs: Runs, left: list[int], out: Scored) -> list[int]:
     assert scores is not None
     sound = np.isfinite(mean).all(axis=1) & np.isfinite(scores.nees).all(axis=1) & np.isfinite(scores.nis).all(axis=1)
     sound &= scores.lowest > _DOUBTFUL
-    scored = score_lanes(scores, runs.belief.model.n, study.kept, seconds)
+    scored = score_lanes(scores, runs.assumed.model.n, study.kept, seconds)
     if whole and sound.all():
         _copy(scored, slice(None), out, slice(None))
         return []
@@ -115,14 +115,14 @@ def _filter(study: Plan, runs: Runs, left: list[int], out: Scored) -> list[int]:
 def _one(study: Plan, label: str, estimator: Any, runs: Runs, i: int) -> dict[str, tuple[Scored, str]]:
     """Scores and message of every view of one run."""
     try:
-        estimate = estimator.estimate(runs.belief, runs.tracking(i))
+        estimate = estimator.estimate(runs.assumed, runs.tracking(i))
         found = [estimate] if estimate.delayed is None else [estimate, estimate.delayed]
         return {e.view: score_estimate(label, e, study.groups, study.kept) for e in found}
     except Exception as error:
         LOGGER.debug("%s failed on run %d", label, i, exc_info=True)
         text = " ".join(str(error).split())
         message = text if isinstance(error, ValueError) and text else f"{type(error).__name__}: {text}".rstrip(": ")
-        empty = nothing(1, len(study.groups), len(study.kept))
+        empty = empty_scores(1, len(study.groups), len(study.kept))
         return dict.fromkeys(views_of(estimator), (empty, message))
 
 

@@ -20,7 +20,7 @@ from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.scenarios.write import problem_to_tables
 from piazzi.simulation import Rule, check_times, true_problem
-from piazzi.study.axes import Axis, Value, estimator_settings, problems_at, read_value, split, variant
+from piazzi.study.variations import Axis, Value, estimator_settings, problems_at, read_value, split, variant
 
 SCHEMA = "piazzi.study/1"
 MOST_POINTS = 100_000

@@ -32,10 +32,10 @@ class Outcome:
     piece: Piece | None = None
     died: str = ""
     error: str = ""
-    hopeless: bool = False
+    fatal: bool = False
 
 
-class Hopeless(str):
+class UnusableWorker(str):
     """What a worker says where it can run no task at all."""
 
 
@@ -56,7 +56,7 @@ class Workers(Protocol):
         """End everything, whatever runs."""
 
 
-class Here:
+class ThisProcess:
     """Tasks in this process, one at a time."""
 
     slots = 1
@@ -170,7 +170,7 @@ class Processes:
         result = pickle.loads(answer)
         if isinstance(result, Piece):
             return Outcome(task, result)
-        return Outcome(task, error=str(result), hopeless=isinstance(result, Hopeless))
+        return Outcome(task, error=str(result), fatal=isinstance(result, UnusableWorker))
 
 
 def end(process: subprocess.Popen[bytes]) -> int:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from piazzi.study.log import Check
-from piazzi.study.pieces import lost
+from piazzi.study.pieces import failed_piece
 from piazzi.study.plan import Plan
 from piazzi.study.tasks import Piece, Task
 from piazzi.study.versions import difference_of, fingerprint
@@ -24,7 +24,7 @@ def checks(study: Plan, path: Path, specification: Mapping[str, Any]) -> Check:
     change = difference_of(versions if isinstance(versions, dict) else {}, fingerprint())
     if change:
         raise ValueError(f"{path} was begun by {change}: results would not be the same; finish it there, or remove it")
-    return partial(_check_piece, study, [_layout(lost(study, Task(0, 0, count), "")) for count in (0, 1)])
+    return partial(_check_piece, study, [_layout(failed_piece(study, Task(0, 0, count), "")) for count in (0, 1)])
 
 
 def _layout(piece: Piece) -> dict[str, tuple[str, list[int]]]:

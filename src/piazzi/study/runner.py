@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from math import ceil
 
 from piazzi.study.log import Log
-from piazzi.study.pieces import lost
+from piazzi.study.pieces import failed_piece
 from piazzi.study.plan import Plan
 from piazzi.study.pool import Outcome, Workers
 from piazzi.study.tasks import Piece, Task
@@ -97,7 +97,7 @@ class Runner:
                 self._seconds_per_run = rate if known is None else 0.5 * (known + rate)
             self._keep(piece)
             return
-        if outcome.hopeless:
+        if outcome.fatal:
             raise RuntimeError(outcome.error)
         why = f"killed its worker ({outcome.died})" if outcome.died else outcome.error
         self._deaths += 1
@@ -112,7 +112,7 @@ class Runner:
         if self._tries[task] <= RETRIES:
             self._again.append(task)
         else:
-            self._keep(lost(self._study, task, f"{why}, {self._tries[task]} times"))
+            self._keep(failed_piece(self._study, task, f"{why}, {self._tries[task]} times"))
 
     def _keep(self, piece: Piece) -> None:
         self._log.append(piece)

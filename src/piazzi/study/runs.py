@@ -1,4 +1,4 @@
-"""Truths and measurements of the runs of a task, in lanes where the problem allows."""
+"""What is random about runs, children of the seed of a study; their truths and measurements, in lanes where possible."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from piazzi.problem import Problem, Tracking
+from piazzi.problem import Problem, Tracking, Truth
 from piazzi.problem.checks import Array
-from piazzi.simulation import check_finite, propagate, true_problem
-from piazzi.study.draws import Draws, draw, why_refused
+from piazzi.simulation import MOST_DRAWS, NoTruthError, Rule, check_finite, placed, propagate, true_problem
 from piazzi.study.lanes import Layout, compiles, simulate_runs
 from piazzi.study.plan import Plan
 from piazzi.study.tasks import Task
+
+PRIOR, PROCESS, MEASUREMENT = range(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,9 +22,9 @@ class Runs:
     """Truths and measurements of runs, and for each, why there is none."""
 
     world: Problem
-    belief: Problem
+    assumed: Problem
     layout: Layout
-    believed: Layout
+    assumed_layout: Layout
     truth: Array
     z: Array
     wrong: list[str]
@@ -37,20 +38,20 @@ class Runs:
 @lru_cache(maxsize=4)
 def _at_point(study: Plan, point: int) -> tuple[Problem, Problem, Problem, Layout, Layout]:
     """The problem as it is measured, as it is believed to be and as it moves; layouts of the first two."""
-    world, belief = study.problems(point)
-    return world, belief, true_problem(world), Layout(world, study.times), Layout(belief, study.times)
+    world, assumed = study.problems(point)
+    return world, assumed, true_problem(world), Layout(world, study.times), Layout(assumed, study.times)
 
 
 def simulated(study: Plan, task: Task) -> Runs:
     """Truths and measurements of the runs of a task."""
-    world, belief, actual, layout, believed = _at_point(study, task.point)
+    world, assumed, actual, layout, assumed_layout = _at_point(study, task.point)
     draws = draw(world, actual, task.runs, study.seed, len(study.times))
     noisy = world.truth is None or world.truth.measurement_noise
     if actual.runs_in_lanes and compiles(simulate_runs, layout, actual, draws.first[:1], draws.w[:1], draws.v[:1], noisy):
         truth, z = simulate_runs(layout, actual, draws.first, draws.w, draws.v, noisy)
     else:
         truth, z = _one_by_one(world, actual, study.times, draws, noisy)
-    return Runs(world, belief, layout, believed, truth, z, _faults(world, actual, study.times, draws, truth, z))
+    return Runs(world, assumed, layout, assumed_layout, truth, z, _faults(world, actual, study.times, draws, truth, z))
 
 
 def _one_by_one(world: Problem, actual: Problem, times: Array, draws: Draws, noisy: bool) -> tuple[Array, Array]:
@@ -78,3 +79,59 @@ def _faults(world: Problem, actual: Problem, times: Array, draws: Draws, truth: 
         except ValueError as error:
             out[i] = str(error)
     return out
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """First states (M, n), unit normal draws of process (M, K, n) and measurement noise (M, J, m), and runs without a truth."""
+
+    first: Array
+    w: Array
+    v: Array
+    refused: Array
+
+
+def child(seed: int, run: int, purpose: int) -> np.random.Generator:
+    """The generator of a run for one purpose: the same whatever else is drawn."""
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(run, purpose))))
+
+
+def draw(world: Problem, actual: Problem, runs: range, seed: int, epochs: int) -> Draws:
+    """Everything random about these runs.
+
+    First states are drawn from the prior until the rule of the truth accepts one; `refused` marks runs where it never does.
+    """
+    n, rows, m = world.model.n, epochs * len(world.stations), world.model.width
+    w, v = np.empty((len(runs), epochs, n)), np.empty((len(runs), rows, m))
+    for i, run in enumerate(runs):
+        child(seed, run, PROCESS).standard_normal(out=w[i])
+        child(seed, run, MEASUREMENT).standard_normal(out=v[i])
+    first, refused = first_states(world, actual, runs, seed)
+    return Draws(first, w, v, refused)
+
+
+def first_states(world: Problem, actual: Problem, runs: range, seed: int) -> tuple[Array, Array]:
+    """True first states (M, n), and marks of runs that have none."""
+    truth = world.truth or Truth()
+    rule = Rule(truth.accept, actual)
+    values, vectors = np.linalg.eigh(actual.covariance)
+    root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    generators = [child(seed, run, PRIOR) for run in runs]
+    out, waiting = np.empty((len(runs), world.model.n)), np.arange(len(runs))
+    for _ in range(MOST_DRAWS if truth.accept else 1):
+        units = np.array([generators[i].standard_normal(world.model.n) for i in waiting])
+        x = np.tile(actual.mean, (len(waiting), 1))
+        for j in range(world.model.n):  # one product at a time: a matrix product rounds by how many runs there are
+            x += units[:, j, None] * root[:, j]
+        out[waiting] = placed(world, truth, x)
+        waiting = waiting[~rule.accepts(out[waiting])]
+        if not waiting.size:
+            break
+    refused = np.zeros(len(runs), dtype=bool)
+    refused[waiting] = True
+    return out, refused
+
+
+def why_refused(world: Problem, actual: Problem) -> str:
+    """What is said about a run without a truth."""
+    return str(NoTruthError(Rule(world.truth.accept if world.truth else (), actual)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.estimate import Estimate
 from piazzi.estimate.chi_square import quantile
-from piazzi.evaluate.metrics import FAR, errors, known_truth, squared_in_sigmas, stays
+from piazzi.evaluate.metrics import FAR, errors, known_truth, not_decreasing, squared_in_sigmas
 from piazzi.evaluate.rows import evaluate
 from piazzi.problem.checks import Array
 from piazzi.study.lanes import Scores
@@ -46,7 +46,7 @@ class Scored:
     rank: Array
 
 
-def nothing(runs: int, groups: int, kept: int) -> Scored:
+def empty_scores(runs: int, groups: int, kept: int) -> Scored:
     """Runs without results."""
     numbers = {name: np.full((runs, groups) if grouped else runs, np.nan) for name, grouped in NUMBERS.items()}
     no = np.zeros(runs, dtype=bool)
@@ -72,7 +72,7 @@ def score_lanes(scores: Scores, n: int, kept: Array, seconds: float) -> Scored:
     }
     diverged = np.median(scores.nees[:, half], axis=1) > FAR * quantile(0.999, float(n))
     if earlier.shape[2]:
-        diverged &= stays(np.sqrt(squared[:, :, 0]), _root_mean(earlier), _root_mean(later)).all(axis=1)
+        diverged &= not_decreasing(np.sqrt(squared[:, :, 0]), _root_mean(earlier), _root_mean(later)).all(axis=1)
     else:
         diverged[:] = False
     error = np.sqrt(squared[:, :, kept]).transpose(0, 2, 1)
@@ -86,7 +86,7 @@ def _root_mean(squared: Array) -> Array:
 def score_estimate(name: str, estimate: Estimate, groups: dict[str, tuple[int, ...]], kept: Array) -> tuple[Scored, str]:
     """Scores of one run, M = 1, and why it failed, "" where it did not."""
     row = evaluate(name, estimate, thorough=False)
-    out = nothing(1, len(groups), len(kept))
+    out = empty_scores(1, len(groups), len(kept))
     for key, values in (("rmse", row.rmse), ("rmse_last_half", row.rmse_last_half)):
         out.numbers[key][0] = [_number(values.get(group)) for group in groups]
     for key in ("mean_nees", "mean_nees_last_half", "mean_nis", "seconds", "iterations"):

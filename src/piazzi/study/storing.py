@@ -27,7 +27,7 @@ def write_store(path: str | os.PathLike[str], study: Plan, log: Log) -> None:
     lost = 0
     with hdf5.written(path) as file:
         _create(file, study)
-        for piece in _together(log.pieces()):
+        for piece in _merged(log.pieces()):
             task = piece.task
             runs = (slice(None), slice(task.first, task.first + task.count)) if task.count else ()
             for name, values in piece.arrays.items():
@@ -42,11 +42,11 @@ def write_store(path: str | os.PathLike[str], study: Plan, log: Log) -> None:
         _write_text(file, "about", {**_about(study), **told})
 
 
-def _together(pieces: Iterable[Piece]) -> Iterator[Piece]:
+def _merged(pieces: Iterable[Piece]) -> Iterator[Piece]:
     """The pieces, those of neighbouring runs as one up to a size: a variable is written as fast for hundreds as for one."""
     waiting: list[Piece] = []
     for piece in pieces:
-        if waiting and not _goes_with(piece, waiting):
+        if waiting and not _adjoins(piece, waiting):
             yield joined(waiting)
             waiting = []
         waiting.append(piece)
@@ -54,7 +54,7 @@ def _together(pieces: Iterable[Piece]) -> Iterator[Piece]:
         yield joined(waiting)
 
 
-def _goes_with(piece: Piece, before: Sequence[Piece]) -> bool:
+def _adjoins(piece: Piece, before: Sequence[Piece]) -> bool:
     last, size = before[-1].task, sum(a.nbytes for p in (*before, piece) for a in p.arrays.values())
     if piece.arrays.keys() != before[-1].arrays.keys():
         return False

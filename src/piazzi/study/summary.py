@@ -31,7 +31,7 @@ class Row:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class History:
     """One row of a study over time, at the T epochs that are kept.
 
     Attributes
@@ -107,13 +107,13 @@ class Line:
     mean_nis: float | None
     seconds: float | None
     iterations: float | None
-    course: Course
+    history: History
 
     def to_dict(self) -> dict[str, Any]:
         """The line in plain values."""
         numbers = ("mean_nees", "mean_nees_last_half", "median_nees_last_half", "mean_nis", "seconds", "iterations")
         groups = ("rmse", "rmse_last_half", "rmse_last_half_quantiles", "over_bound")
-        c = self.course
+        c = self.history
         return {
             "point": dict(self.point),
             **{k: getattr(self, k) for k in ("estimator", "view", "runs", "failed", "diverged")},
@@ -124,13 +124,13 @@ class Line:
             "nees_inside": c.inside,
             "nees_ideal": c.ideal,
             "over_time": {
-                "nees": plain(c.nees),
-                "nees_bounds": plain(c.nees_bounds),
+                "nees": json_values(c.nees),
+                "nees_bounds": json_values(c.nees_bounds),
                 **{
                     g: {
-                        "quantiles": plain(c.quantiles[:, :, i]),
-                        "rms": plain(c.rms[:, i]),
-                        "bound": plain(c.bound[:, i]),
+                        "quantiles": json_values(c.quantiles[:, :, i]),
+                        "rms": json_values(c.rms[:, i]),
+                        "bound": json_values(c.bound[:, i]),
                     }
                     for i, g in enumerate(self.rmse)
                 },
@@ -165,18 +165,18 @@ def line_of(
         _mean(found.numbers["mean_nis"][good]),
         _mean(found.numbers["seconds"][good]),
         _mean(found.numbers["iterations"][good]),
-        _course(found, bound),
+        _history(found, bound),
     )
 
 
-def _course(row: Row, bound: Array) -> Course:
+def _history(row: Row, bound: Array) -> History:
     error, nees, rank = (a[row.success].astype(float) for a in (row.error, row.nees, row.rank))
     M, (T, G) = len(error), row.error.shape[1:]
     if not M:
         nothing, none = np.full((T, G), np.nan), np.full(T, np.nan)
-        return Course(np.full((len(QUANTILES), T, G), np.nan), nothing, bound, none, np.zeros(T), np.full((2, T), np.nan))
+        return History(np.full((len(QUANTILES), T, G), np.nan), nothing, bound, none, np.zeros(T), np.full((2, T), np.nan))
     quantiles, rms = np.quantile(error, QUANTILES, axis=0), np.sqrt((error**2).mean(axis=0))
-    return Course(quantiles, rms, bound, *_nees(nees, rank))
+    return History(quantiles, rms, bound, *_nees(nees, rank))
 
 
 def _nees(nees: Array, rank: Array) -> tuple[Array, Array, Array]:
@@ -233,8 +233,8 @@ def _finite(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def plain(values: Array) -> Any:
+def json_values(values: Array) -> Any:
     """Nested lists for JSON, None where a number is not finite."""
     if values.ndim > 1:
-        return [plain(part) for part in values]
+        return [json_values(part) for part in values]
     return [float(f"{v:.7g}") if isfinite(v) else None for v in values.tolist()]

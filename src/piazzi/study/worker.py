@@ -16,7 +16,7 @@ def main() -> None:
     source, sink = sys.stdin.buffer, os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what somebody prints must not get between the results
     from piazzi.study.pieces import run_task
-    from piazzi.study.pool import Hopeless, receive, send
+    from piazzi.study.pool import UnusableWorker, receive, send
 
     first = receive(source)
     if first is None:
@@ -24,17 +24,17 @@ def main() -> None:
     try:
         study, why = pickle.loads(first), ""
     except Exception as error:
-        study, why = None, f"a worker cannot read the study: {_told(error)}"
+        study, why = None, f"a worker cannot read the study: {_error_text(error)}"
     while (message := receive(source)) is not None:
         try:
-            answer = pickle.dumps(Hopeless(why) if why else run_task(study, pickle.loads(message)))
+            answer = pickle.dumps(UnusableWorker(why) if why else run_task(study, pickle.loads(message)))
         except Exception as error:
-            answer = pickle.dumps(_told(error))
+            answer = pickle.dumps(_error_text(error))
         try:
             send(sink, answer)
         except BrokenPipeError:
             return
 
 
-def _told(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())}"

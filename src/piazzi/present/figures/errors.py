@@ -1,4 +1,4 @@
-"""How wrong the estimates are, and how wrong they say they are."""
+"""How wrong the estimates are, how wrong they say they are, and whether they are right about that."""
 
 from __future__ import annotations
 
@@ -22,12 +22,15 @@ from piazzi.present.figures.style import (
     symmetric_scale,
     time_axis,
 )
+from piazzi.present.squares import Squares, nees_of, nis_of
 from piazzi.problem.checks import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+
 SIGMAS = 3.0
+RANGE = "95 % of a matched run"
 
 
 def state_error(ax: Axes, estimate: Estimate, state: str, *, name: str = "estimate", show: Display | None = None) -> Axes:
@@ -130,3 +133,40 @@ def _lengths(comparison: Comparison, group: str) -> list[tuple[Array | None, Arr
         claimed = np.sqrt(np.maximum(np.diagonal(estimate.covariance, axis1=1, axis2=2)[:, columns].sum(axis=1), 0.0))
         out.append((None if error is None else np.sqrt((error[:, columns] ** 2).sum(axis=1)), claimed))
     return out
+
+
+def nees_track(ax: Axes, comparison: Comparison) -> Axes:
+    """NEES of every epoch, a line for every view, over the range that holds 95 % of a matched run's values.
+
+    Raises
+    ------
+    ValueError
+        Where there is no truth.
+    """
+    found = nees_of(comparison)
+    if found is None:
+        raise ValueError("NEES needs the truth, which is not known here")
+    return _track(ax, comparison, found)
+
+
+def nis_track(ax: Axes, comparison: Comparison) -> Axes:
+    """NIS averaged over a thirtieth of the run, a line for every view, over the range of 95 % of a matched run's means."""
+    return _track(ax, comparison, nis_of(comparison))
+
+
+def _track(ax: Axes, comparison: Comparison, found: Squares) -> Axes:
+    time = time_axis(ax, comparison.tracking.times)
+    ax.axhspan(found.low, found.high, color=MEASURED, alpha=0.13, lw=0, label=RANGE)
+    ax.axhline(found.expected, color=MEASURED, lw=0.9, ls=(0, (5, 3)), label="ideal mean")
+    part, names = drawn(len(found.times)), tuple(name for name, _ in comparison.views)
+    seen = [np.array([found.low, found.high])]
+    for (name, view), values in zip(comparison.views, found.values, strict=True):
+        ax.plot(found.times[part] * time.factor, values[part], **line_of(name, view, names), lw=1.0, label=label_of(name, view))
+        seen.append(values[np.isfinite(values) & (values > 0)])
+    ax.set_yscale("log")
+    everything = np.concatenate(seen)
+    low, high = np.quantile(everything, 0.005), everything.max()
+    ax.set_ylim(max(min(low, found.low) / 1.3, found.low / 100), 1.3 * high)
+    plain_ticks(ax)
+    ax.set_ylabel(f"{found.name} ({found.ideal})")
+    return ax

@@ -11,8 +11,15 @@ from piazzi.estimate import Estimate
 from piazzi.evaluate.comparison import Comparison
 from piazzi.evaluate.metrics import errors, groups
 from piazzi.io.atomic import atomic_path
-from piazzi.present.figures.consistency import nees_track, nis_track
-from piazzi.present.figures.errors import claim_overlay, error_overlay, size_of, state_display, state_error
+from piazzi.present.figures.errors import (
+    claim_overlay,
+    error_overlay,
+    nees_track,
+    nis_track,
+    size_of,
+    state_display,
+    state_error,
+)
 from piazzi.present.figures.measured import innovations, measurements
 from piazzi.present.figures.space import orbit, position_at, position_columns
 from piazzi.present.figures.style import MEASURED, RC, label_of, plain, symmetric_scale

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.evaluate import Observability
+from piazzi.evaluate.observable import Observability
 from piazzi.present.figures.style import MEASURED, STATIONS, plain, plain_ticks, time_axis
 from piazzi.problem.checks import Array
 

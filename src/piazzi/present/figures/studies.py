@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from piazzi.present.figures.pages import save
 from piazzi.present.figures.style import RC, label_of, line_of, plain, plain_ticks, time_axis
-from piazzi.present.studies import group_display, ideal_nees, point_name, widest_bounds
+from piazzi.present.study_table import group_display, ideal_nees, point_name, widest_bounds
 from piazzi.study import Line, Summary
 from piazzi.text import printable
 
@@ -54,12 +54,12 @@ def error_page(summary: Summary, lines: list[Line]) -> Figure:
         unit = time_axis(ax, stored.times)
         for line in lines:
             style = line_of(line.estimator, line.view, names)
-            rms, (low, _, high) = line.course.rms[:, i], line.course.quantiles[:, :, i] * show.factor
+            rms, (low, _, high) = line.history.rms[:, i], line.history.quantiles[:, :, i] * show.factor
             ax.plot(stored.times * unit.factor, rms * show.factor, label=label_of(line.estimator, line.view), **style)
             if len(lines) <= FEW:
                 ax.fill_between(stored.times * unit.factor, low, high, color=style["color"], alpha=0.12, linewidth=0)
         for view, dash in (("realtime", ":"), ("delayed", "-.")):
-            bound = next((line.course.bound[:, i] for line in lines if line.view == view), None)
+            bound = next((line.history.bound[:, i] for line in lines if line.view == view), None)
             if bound is not None:
                 label = f"bound, {'real time' if view == 'realtime' else 'delayed'}"
                 ax.plot(stored.times * unit.factor, bound * show.factor, color="black", linestyle=dash, label=label)
@@ -80,7 +80,7 @@ def nees_page(summary: Summary, lines: list[Line]) -> Figure:
     unit = time_axis(ax, stored.times)
     for line in lines:
         style = line_of(line.estimator, line.view, names)
-        ax.plot(stored.times * unit.factor, line.course.nees, label=label_of(line.estimator, line.view), **style)
+        ax.plot(stored.times * unit.factor, line.history.nees, label=label_of(line.estimator, line.view), **style)
     widest = widest_bounds(lines)
     if widest is not None:
         ax.fill_between(stored.times * unit.factor, *widest, color="#BBBBBB", alpha=0.5, label="99 % bounds")

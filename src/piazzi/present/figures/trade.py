@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.evaluate import WindowTrade
-from piazzi.evaluate.display import row_display
+from piazzi.evaluate.comparison_table import row_display
+from piazzi.evaluate.window_trade import WindowTrade
 from piazzi.present.figures.style import COLOURS, MEASURED, plain, plain_ticks
 from piazzi.problem.checks import Array
 

@@ -1,19 +1,6 @@
 """One HTML page that needs nothing else: `page` of tabs of blocks, and the tabs of what Piazzi computes."""
 
-from piazzi.present.report.blocks import (
-    Axis,
-    Chart,
-    Key,
-    Line,
-    Now,
-    Orbit,
-    Point,
-    Section,
-    Tab,
-    Table,
-    Text,
-    Track,
-)
+from piazzi.present.report.blocks import Chart, Key, Section, Tab
 from piazzi.present.report.comparison import comparison_tab
 from piazzi.present.report.observability import observability_section, observability_tab
 from piazzi.present.report.page import page
@@ -22,25 +9,6 @@ from piazzi.present.report.windows import windows_section, windows_tab
 from piazzi.present.report.write import write_page, write_report
 
 __all__ = [
-    "Axis",
-    "Chart",
-    "Key",
-    "Line",
-    "Now",
-    "Orbit",
-    "Point",
-    "Section",
-    "Tab",
-    "Table",
-    "Text",
-    "Track",
-    "comparison_tab",
-    "observability_section",
-    "observability_tab",
-    "page",
-    "study_tabs",
-    "windows_section",
-    "windows_tab",
-    "write_page",
-    "write_report",
-]
+    "Chart", "Key", "Section", "Tab", "comparison_tab", "observability_section", "observability_tab", "page", "study_tabs",
+    "windows_section", "windows_tab", "write_page", "write_report",
+]  # fmt: skip

@@ -126,7 +126,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Now:
+class CursorValues:
     """A table of the values at the cursor, filled by the page from the charts that have a column."""
 
     title: str = "At the cursor"
@@ -139,7 +139,7 @@ class Text:
     paragraphs: Sequence[str]
 
 
-Block = Chart | Orbit | Table | Now | Text
+Block = Chart | Orbit | Table | CursorValues | Text
 
 
 @dataclass(frozen=True)

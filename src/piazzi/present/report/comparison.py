@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from piazzi.evaluate import Comparison
-from piazzi.evaluate.display import columns
+from piazzi.evaluate.comparison_table import columns
 from piazzi.present.figures.style import time_display
-from piazzi.present.report.blocks import Now, Point, Section, Tab, Table, Text
+from piazzi.present.report.blocks import CursorValues, Point, Section, Tab, Table, Text
 from piazzi.present.report.panels import consistency, group_charts, innovations, state_charts
 from piazzi.present.report.paths import orbits
 from piazzi.present.report.views import Views
@@ -18,7 +18,7 @@ _PLAY = "Dots and 3-sigma ellipses are where the cursor is: play, drag the slide
 _UNKNOWN = "The truth is not known, so errors are not shown; what the covariances expect of them is."
 _INSIDE = "The error of the estimator looked at closely, within three sigma of its own covariance: it should rarely leave them."
 _BANDS = "The truth is not known, so there is no error to draw: three sigma of the estimator looked at closely."
-_HONEST = (
+_CONSISTENCY = (
     "Innovations should look like noise within three sigma. NEES and NIS are squared errors and innovations in units of the"
     " covariance: values that stay above the grey range mean that the covariance is too small."
 )
@@ -63,11 +63,11 @@ def _sections(views: Views, planet_radius: float | None) -> list[Section]:
         *([Section("The orbit", paths, _PLAY)] if paths else []),
         Section(
             "Errors and their predicted standard deviations",
-            [*group_charts(views), Now("Values at the cursor")],
+            [*group_charts(views), CursorValues("Values at the cursor")],
             "" if known else _UNKNOWN,
         ),
         Section("State by state", state_charts(views), _INSIDE if known else _BANDS),
-        Section("Consistency", [*innovations(views), *consistency(views)], _HONEST if known else _HONEST + _NO_NEES),
+        Section("Consistency", [*innovations(views), *consistency(views)], _CONSISTENCY if known else _CONSISTENCY + _NO_NEES),
     ]
 
 

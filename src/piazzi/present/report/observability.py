@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from piazzi.evaluate import Observability
+from piazzi.evaluate.observable import Observability
 from piazzi.evaluate.quantities import Display
 from piazzi.present.colours import STATIONS
 from piazzi.present.figures.style import time_display
@@ -26,7 +26,7 @@ def observability_tab(found: Observability, *, title: str = "") -> Tab:
     return Tab(
         title or found.source or "Observability",
         subtitle,
-        said(found),
+        verdict_points(found),
         [observability_section(found, words=False)],
         times=found.growth_times,
         show_time=time_display(found.growth_times),
@@ -35,11 +35,11 @@ def observability_tab(found: Observability, *, title: str = "") -> Tab:
 
 def observability_section(found: Observability, *, words: bool = True) -> Section:
     """Singular values and Cramer-Rao sigmas over time, directions, and twins."""
-    says = [Text([f"{point.heading}: {point.text}" for point in said(found)])] if words else []
+    says = [Text([f"{point.heading}: {point.text}" for point in verdict_points(found)])] if words else []
     return Section("Observability", [*says, _singular_values(found), _sigmas(found), *map(table_of, found.grids())], _INTRO)
 
 
-def said(found: Observability) -> list[Point]:
+def verdict_points(found: Observability) -> list[Point]:
     """The verdict's sentences under headings of their own: what it calls verdict first."""
     points: list[Point] = []
     for line in found.sentences():

@@ -9,9 +9,8 @@ from importlib.resources import files
 from typing import Any
 
 from piazzi.evaluate.quantities import Display
-from piazzi.present.report.blocks import Axis, Block, Chart, Line, Now, Orbit, Section, Tab, Table, Text, Track
-from piazzi.present.report.encode import Pool, script_json
-from piazzi.present.report.pieces import legend, line_mark, summary_point, tab_chooser, table_panel, text
+from piazzi.present.report.blocks import Axis, Block, Chart, CursorValues, Line, Orbit, Section, Tab, Table, Text, Track
+from piazzi.present.report.html import Pool, legend, line_mark, script_json, summary_point, tab_chooser, table_panel, text
 from piazzi.text import printable
 
 SCRIPTS = ("data.js", "scales.js", "chart.js", "orbit.js", "tab.js", "page.js")
@@ -139,7 +138,7 @@ class _Builder:
                 return self._drawing(block.title, block.note, self._orbit(block))
             case Table():
                 return table_panel(block)
-            case Now():
+            case CursorValues():
                 return (
                     f'<div class="panel full"><h4>{text(block.title)}</h4><div class="scroll" tabindex="0" role="region"'
                     f' aria-label="{text(block.title)}"><table class="now"></table></div></div>'

@@ -12,8 +12,7 @@ from piazzi.evaluate.quantities import Display, display_of, unit_of
 from piazzi.present.colours import DASHES
 from piazzi.present.figures.measured import component_of
 from piazzi.present.report.blocks import Axis, Chart, Line
-from piazzi.present.report.thinning import Thinning
-from piazzi.present.report.views import Views
+from piazzi.present.report.views import Thinning, Views
 from piazzi.present.squares import Squares, nees_of, nis_of
 from piazzi.problem.checks import Array
 

@@ -10,7 +10,7 @@ from piazzi.evaluate.quantities import Display, number
 from piazzi.present.colours import dash_of, label_of, shades
 from piazzi.present.figures.style import time_display
 from piazzi.present.report.blocks import Axis, Chart, Key, Line, Point, Section, Tab, Table, Text
-from piazzi.present.studies import columns, failures, group_display, heading, ideal_nees, point_name, widest_bounds
+from piazzi.present.study_table import columns, failures, group_display, heading, ideal_nees, point_name, widest_bounds
 from piazzi.problem.checks import Array
 from piazzi.study import Line as Result
 from piazzi.study import Summary
@@ -68,15 +68,15 @@ def _errors(summary: Summary, lines: Sequence[Result], keys: Sequence[Key], axis
     show = group_display(stored, group)
     out = []
     kinds = [
-        ("Median", [line.course.quantiles[1, :, i] for line in lines]),
-        ("Root mean square", [line.course.rms[:, i] for line in lines]),
-        ("95 % of runs are below", [line.course.quantiles[2, :, i] for line in lines]),
+        ("Median", [line.history.quantiles[1, :, i] for line in lines]),
+        ("Root mean square", [line.history.rms[:, i] for line in lines]),
+        ("95 % of runs are below", [line.history.quantiles[2, :, i] for line in lines]),
     ]
     for kind, found in kinds:
         drawn = [Line(stored.times, y, keys[k].label, k) for k, y in enumerate(found)]
         if kind == "Root mean square":
             for view, dash in (("realtime", (2, 2)), ("delayed", (6, 2))):
-                bound = next((line.course.bound[:, i] for line in lines if line.view == view), None)
+                bound = next((line.history.bound[:, i] for line in lines if line.view == view), None)
                 if bound is not None and np.isfinite(bound).any():
                     drawn.append(Line(stored.times, bound, f"bound, {view}", colour="#777777", dash=dash))
         low, high = _limits([line.y for line in drawn if not isinstance(line.y, tuple)])
@@ -88,10 +88,10 @@ def _errors(summary: Summary, lines: Sequence[Result], keys: Sequence[Key], axis
 
 
 def _nees(lines: Sequence[Result], keys: Sequence[Key], axis: Axis, times: Array) -> Chart:
-    drawn = [Line(times, line.course.nees, keys[k].label, k) for k, line in enumerate(lines)]
+    drawn = [Line(times, line.history.nees, keys[k].label, k) for k, line in enumerate(lines)]
     widest = widest_bounds(lines)
     bounds = np.full((2, 1), np.nan) if widest is None else widest
-    bottom, top = _limits([*(line.course.nees for line in lines), bounds.ravel()])
+    bottom, top = _limits([*(line.history.nees for line in lines), bounds.ravel()])
     ranges: list[tuple[float, float, str]] = []
     if np.isfinite(bounds).all() and (bounds == bounds[:, :1]).all():
         ranges = [(float(bounds[0, 0]), float(bounds[1, 0]), "")]
@@ -127,10 +127,10 @@ def _points(summary: Summary, lines: Sequence[Result]) -> list[Point]:
     diverged = [line for line in lines if line.diverged]
     text = "; ".join(f"{label_of(line.estimator, line.view)}: {line.diverged:,} of {line.runs:,}" for line in diverged)
     out.append(Point("Diverged", f"{text}." if text else "No run.", "bad" if diverged else "good"))
-    honest = [line for line in lines if (line.course.inside or 0.0) >= 0.9]
-    names = ", ".join(label_of(line.estimator, line.view) for line in honest)
+    consistent = [line for line in lines if (line.history.inside or 0.0) >= 0.9]
+    names = ", ".join(label_of(line.estimator, line.view) for line in consistent)
     text = f"{names}." if names else "None: the mean NEES leaves its bounds."
-    out.append(Point("Consistent at nine epochs of ten", text, "good" if honest else "bad"))
+    out.append(Point("Consistent at nine epochs of ten", text, "good" if consistent else "bad"))
     failed = [line for line in lines if line.failed]
     if failed:
         text = "; ".join(f"{label_of(line.estimator, line.view)}: {line.failed:,}" for line in failed)

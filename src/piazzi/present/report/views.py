@@ -1,20 +1,23 @@
-"""Every estimate of a comparison with its place in the legend, and what of its length is shown."""
+"""What a page shows of a comparison: its views, and of long runs the smallest and the largest value of every few epochs."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from piazzi.estimate import Estimate
 from piazzi.evaluate import Comparison
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
-from piazzi.evaluate.honesty import LONGEST
+from piazzi.evaluate.consistency_tests import LONGEST
 from piazzi.evaluate.metrics import known_truth
 from piazzi.evaluate.quantities import Display
 from piazzi.present.colours import dash_of, label_of, shades
 from piazzi.present.figures.style import time_display
 from piazzi.present.report.blocks import Axis, Key
-from piazzi.present.report.thinning import Thinning
 from piazzi.problem.checks import Array
+
+MOST_POINTS = 1500
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,3 +73,56 @@ class Views:
         if thin.size == 1:
             return ""
         return f"Of every {thin.size:,} of {thin.count:,} values the smallest and the largest are drawn."
+
+
+@dataclass(frozen=True)
+class Thinning:
+    """Which of `count` values a page holds: all of them up to `MOST_POINTS`, else two of every bucket of `size`."""
+
+    count: int
+
+    @property
+    def size(self) -> int:
+        """How many values make two; 1 where all are kept."""
+        return 1 if self.count <= MOST_POINTS else -(-self.count // (MOST_POINTS // 2))
+
+    @property
+    def places(self) -> Array:
+        """Where the values that are kept belong, increasing; in a bucket at its first and third quarter."""
+        if self.size == 1:
+            return np.arange(self.count)
+        starts = np.arange(0, self.count, self.size)
+        ends = np.minimum(starts + self.size, self.count)
+        quarters = [starts + (ends - starts) // 4, starts + 3 * (ends - starts) // 4]
+        return np.unique(np.stack(quarters, axis=1).ravel()) if self.count % self.size == 1 else np.stack(quarters, 1).ravel()
+
+    def at_places(self, values: Array) -> Array:
+        """The values where they belong."""
+        return values[self.places]
+
+    def sample(self, values: Array, bound: Array) -> Array:
+        """The values where they belong, but in a bucket with any beyond the bound the largest in its place."""
+        shown = values[self.places]
+        if self.size == 1:
+            return shown
+        with np.errstate(invalid="ignore", divide="ignore"):
+            excess = np.nan_to_num(np.abs(values) / bound, nan=0.0, posinf=0.0)
+        starts = np.arange(0, self.count, self.size)
+        for bucket in np.flatnonzero(np.maximum.reduceat(excess, starts) > 1.0).tolist():
+            part = slice(starts[bucket], starts[bucket] + self.size)
+            shown[np.searchsorted(self.places, starts[bucket])] = values[part][np.argmax(excess[part])]
+        return shown
+
+    def extremes(self, values: Array) -> Array:
+        """The smallest and the largest of every bucket, in the order in which they came; NaN where a bucket has none."""
+        if self.size == 1:
+            return values
+        rows = -(-self.count // self.size)
+        padded = np.full(rows * self.size, np.nan)
+        padded[: self.count] = np.where(np.isfinite(values), values, np.nan)
+        buckets = padded.reshape(rows, self.size)
+        absent = np.isnan(buckets)
+        low, high = np.where(absent, np.inf, buckets).argmin(axis=1), np.where(absent, -np.inf, buckets).argmax(axis=1)
+        each = np.arange(rows)
+        out: Array = np.stack([buckets[each, np.minimum(low, high)], buckets[each, np.maximum(low, high)]], axis=1).ravel()
+        return out[: len(self.places)]

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from piazzi.evaluate import WindowTrade
-from piazzi.evaluate.display import row_display
+from piazzi.evaluate.comparison_table import row_display
 from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.quantities import Display, ideal
+from piazzi.evaluate.window_trade import WindowTrade
 from piazzi.present.colours import COLOURS, DASHES
 from piazzi.present.report.blocks import Axis, Chart, Line, Point, Section, Tab, Table, Text
 from piazzi.present.tables import summary

@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 
 from piazzi.evaluate import Comparison, Row
-from piazzi.evaluate.display import row_display
+from piazzi.evaluate.comparison_table import row_display
 from piazzi.evaluate.judgement import (
     CLEARLY,
     CONSISTENT,
-    LEVEL,
     OPTIMISTIC,
     PESSIMISTIC,
-    SETTLING,
+    SAME_ERROR,
+    SLOW_CONVERGENCE,
     claims,
     errors_known,
     failing,
-    fails_early,
-    sound,
+    fails_at_first_only,
+    not_diverged,
 )
 from piazzi.evaluate.quantities import duration, number
 from piazzi.present.report.blocks import Point, Tone
@@ -42,16 +42,16 @@ _FEW = 3  # names that a sentence lists before it counts them
 def points(comparison: Comparison) -> list[Point]:
     """The summary of a comparison, the most useful first."""
     rows = comparison.rows
-    judged = sound(rows)
+    judged = not_diverged(rows)
     out: list[Point] = []
     if errors_known(judged):
         out += [p for view in ("realtime", "delayed") for p in _best(comparison, [r for r in judged if r.view == view], view)]
     elif judged:
         out.append(Point("Errors unknown", "There is no truth to compare with; innovations are judged instead."))
     out += _failed(rows)
-    out += _honesty(comparison)
-    out += _against(judged)
-    out += _settling(comparison, judged)
+    out += _consistency(comparison)
+    out += _not_white(judged)
+    out += _slow_convergence(comparison, judged)
     out += _cost(rows)
     return out or [Point("Nothing to show", "No estimator gave a result.", "bad")]
 
@@ -68,7 +68,7 @@ def _best(comparison: Comparison, rows: Sequence[Row], view: str) -> list[Point]
         return []
     ranked = sorted(found, key=lambda pair: pair[0])
     best, first = ranked[0]
-    level = [r.estimator for v, r in ranked if v <= LEVEL * best]
+    level = [r.estimator for v, r in ranked if v <= SAME_ERROR * best]
     others = [v for v, _ in ranked[len(level) :]]
     text = f"{listed(level)}: {_errors(comparison, first)} {_PART[view]}"
     if others:
@@ -130,23 +130,23 @@ def _failed(rows: Sequence[Row]) -> list[Point]:
     return out
 
 
-def _honesty(comparison: Comparison) -> list[Point]:
+def _consistency(comparison: Comparison) -> list[Point]:
     """Whose covariance is consistent with the errors."""
     found = claims(comparison.rows, comparison.tracking.values)
     everyone = [r for claim in found for r in claim.rows]
-    what = "Errors" if errors_known(sound(comparison.rows)) else "Innovations"
+    what = "Errors" if errors_known(not_diverged(comparison.rows)) else "Innovations"
     out = []
     for claim in found:
         heading, tone, advice = _CLAIMS[claim.sign]
         out.append(Point(heading, f"{what} of {_named(claim.rows, everyone)} are {claim.text}{advice}.", tone))
-    early = [r for r in everyone if fails_early(r)]
+    early = [r for r in everyone if fails_at_first_only(r)]
     if early:
         text = f"Over the whole run the errors of {_named(early, everyone)} are inconsistent with the covariance (NEES)."
         out.append(Point("Inconsistent at first", text, "bad"))
     return out
 
 
-def _against(rows: Sequence[Row]) -> list[Point]:
+def _not_white(rows: Sequence[Row]) -> list[Point]:
     """Whose innovations speak against the model, and in which way."""
     wrong: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
@@ -175,14 +175,14 @@ def _named(chosen: Sequence[Row], everyone: Sequence[Row]) -> str:
     return listed(names)
 
 
-def _settling(comparison: Comparison, rows: Sequence[Row]) -> list[Point]:
+def _slow_convergence(comparison: Comparison, rows: Sequence[Row]) -> list[Point]:
     """Who is far off before settling."""
     rows = [r for r in rows if r.view == "realtime"]
     group = _first_group(rows)
     slow, sizes = [], []
     for r in rows:
         whole, late = r.rmse.get(group), r.rmse_last_half.get(group)
-        if whole is not None and late is not None and isfinite(whole) and whole > SETTLING * late:
+        if whole is not None and late is not None and isfinite(whole) and whole > SLOW_CONVERGENCE * late:
             slow.append(r)
             sizes.append(whole)
     if not slow:
@@ -190,10 +190,10 @@ def _settling(comparison: Comparison, rows: Sequence[Row]) -> list[Point]:
     show = row_display(comparison.problem.model, comparison.rows, group)
     ends = dict.fromkeys(f"{number(v * show.factor, 3)}{show.suffix}" for v in (min(sizes), max(sizes)))
     text = f"Over the whole run the {group} error of {_named(slow, rows)} is {' to '.join(ends)} (RMS)"
-    return [Point("Slow to converge", f"{text}: do not use the first estimates{_settled(slow)}.", "bad")]
+    return [Point("Slow to converge", f"{text}: do not use the first estimates{_convergence_times(slow)}.", "bad")]
 
 
-def _settled(rows: Sequence[Row]) -> str:
+def _convergence_times(rows: Sequence[Row]) -> str:
     """When they have settled, where that is known."""
     found = [r.convergence_time for r in rows if r.convergence_time is not None and isfinite(r.convergence_time)]
     if not found:

@@ -12,8 +12,7 @@ from piazzi.problem import Gaussian, ProcessNoise, Station
 from piazzi.problem.checks import Array, covariance
 from piazzi.problem.constants import constant_name
 from piazzi.scenarios.equations import Physics
-from piazzi.scenarios.faults import shown
-from piazzi.scenarios.table import Table
+from piazzi.scenarios.table import Table, shown
 from piazzi.units import ONE, Units
 
 FIRST = "first"  # measurement: where a prior stands that goes with any recording

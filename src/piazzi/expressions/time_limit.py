@@ -15,7 +15,7 @@ from typing import TypeVar
 A = TypeVar("A")
 T = TypeVar("T")
 SECONDS = 5.0  # of a processor, where the system can tell, for one equation
-_AGAIN = 0.2  # seconds after which the interruption is repeated: SymPy catches some
+_REPEAT_SECONDS = 0.2  # seconds after which the interruption is repeated: SymPy catches some
 
 
 class TooSlowError(ValueError):
@@ -26,14 +26,14 @@ class TooSlowError(ValueError):
         self.at = at
 
 
-def patiently(call: Callable[[], T], seconds: float | None = None) -> T:
+def with_time_limit(call: Callable[[], T], seconds: float | None = None) -> T:
     """What a call returns; raises TooSlowError where it takes more than `seconds` (default: `SECONDS`)."""
-    return each_patiently(lambda _: call(), [None], seconds)[0]
+    return each_with_time_limit(lambda _: call(), [None], seconds)[0]
 
 
-def each_patiently(call: Callable[[A], T], items: Sequence[A], seconds: float | None = None) -> list[T]:
+def each_with_time_limit(call: Callable[[A], T], items: Sequence[A], seconds: float | None = None) -> list[T]:
     """What a call makes of each item, in turn; raises TooSlowError where one of them takes more than `seconds`."""
-    watch, done = _Watch(SECONDS if seconds is None else seconds), list[T]()
+    watch, done = _Timer(SECONDS if seconds is None else seconds), list[T]()
     try:
         try:
             for item in items:
@@ -54,7 +54,7 @@ def each_patiently(call: Callable[[A], T], items: Sequence[A], seconds: float | 
         raise TooSlowError(watch.seconds, len(done)) from None
 
 
-class _Watch:
+class _Timer:
     """A thread that interrupts the one that made it, until it is stopped."""
 
     def __init__(self, seconds: float) -> None:
@@ -84,7 +84,7 @@ class _Watch:
             with self._lock:
                 wait = self._start + self.seconds - self._used()
                 if wait <= 0 and not self._stopped.is_set():
-                    wait, self._sent = _AGAIN, True
+                    wait, self._sent = _REPEAT_SECONDS, True
                     _interrupt(self._thread, self.interruption)
 
 

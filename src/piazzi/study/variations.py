@@ -97,17 +97,17 @@ def problems_at(problem: Problem, axes: Sequence[Axis], values: Sequence[Value])
     ValueError
         For a value that does not fit.
     """
-    changes, world, belief = problem_changes(problem), problem, problem
+    changes, world, assumed = problem_changes(problem), problem, problem
     for axis, value in zip(axes, values, strict=True):
         change = changes[axis.name.removeprefix(ASSUMED).removeprefix(TRUTH)]
         if isinstance(value, str):
             raise ValueError(f"{axis.name} is {value!r}; it must be a number")
         try:
             world = world if axis.name.startswith(ASSUMED) else change(world, value)
-            belief = belief if axis.name.startswith(TRUTH) else change(belief, value)
+            assumed = assumed if axis.name.startswith(TRUTH) else change(assumed, value)
         except ValueError as error:
             raise ValueError(f"{axis.name} = {value}: {error}") from None
-    return world, belief
+    return world, assumed
 
 
 def variant(estimator: Any, settings: Mapping[str, Value]) -> Any:

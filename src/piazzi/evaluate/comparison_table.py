@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from piazzi.evaluate.judgement import claims, errors_known, expected_nis, failing, fails_early, sound, tested
+from piazzi.evaluate.grids import fits, rich_table
+from piazzi.evaluate.judgement import claims, errors_known, expected_nis, failing, fails_at_first_only, not_diverged, tested
 from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, unit_of
 from piazzi.model import Model
 from piazzi.text import printable
@@ -93,7 +94,6 @@ def render(model: Model, rows: Sequence[Row], values: Array, console: Console, o
     All columns where they fit the width; else those of the last half; else without bounds and tests; else a block of lines for
     each row.
     """
-    from rich.measure import Measurement
     from rich.text import Text
 
     everything = columns(model, rows, values)
@@ -101,7 +101,7 @@ def render(model: Model, rows: Sequence[Row], values: Array, console: Console, o
     least = [c for c in fewer if c.name != TESTS and not c.name.endswith(BOUND)]
     for chosen in (everything, fewer, least):
         table = wide_table(chosen)
-        if Measurement.get(console, options.update(max_width=10_000), table).maximum <= options.max_width:
+        if fits(table, console, options):
             yield table
             if chosen is not everything:
                 yield Text("A wider terminal shows the whole run too.", style="dim")
@@ -115,19 +115,9 @@ def render(model: Model, rows: Sequence[Row], values: Array, console: Console, o
 
 def wide_table(shown: Sequence[Column]) -> Any:
     """A rich table that does not wrap."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=box.SIMPLE_HEAD, header_style="bold", show_edge=False, padding=(0, 1, 0, 0))
-    for i, c in enumerate(shown):
-        heading = Text("\n".join([*c.name.split(), *filter(None, (c.part, c.unit))]))
-        table.add_column(
-            heading, justify="left" if i < _TEXT_COLUMNS or not c.name else "right", no_wrap=True, vertical="bottom"
-        )
-    for row in zip(*(c.texts for c in shown), strict=True):
-        table.add_row(*(Text(v, style=_style(v)) for v in row))
-    return table
+    heads = ["\n".join([*c.name.split(), *filter(None, (c.part, c.unit))]) for c in shown]
+    words = [i < _TEXT_COLUMNS or not c.name for i, c in enumerate(shown)]
+    return rich_table(zip(heads, words, strict=True), zip(*(c.texts for c in shown), strict=True), _style)
 
 
 def blocks(shown: Sequence[Column]) -> Iterable[Any]:
@@ -156,7 +146,7 @@ def _style(value: str) -> str:
 
 def sentences(model: Model, rows: Sequence[Row], values: Array) -> list[str]:
     """What the table means, in plain words: who is best, whose covariance is consistent, who failed."""
-    judged = sound(rows)
+    judged = not_diverged(rows)
     out = [f"{r.estimator} did not succeed: {r.message}." for r in rows if not r.success]
     diverged = dict.fromkeys(r.estimator for r in rows if r.success and r.diverged)
     out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down enough." for name in diverged]
@@ -186,7 +176,7 @@ def _tested(rows: Sequence[Row]) -> list[str]:
     passed = [_named(r, rows) for r in judged if not failing(r)]
     who = "All others pass" if out else f"{passed[0]} passes" if len(passed) == 1 else "All pass"
     out += [f"{who} the consistency tests (NEES of the last half, NIS, whiteness, bias; 5 % level)."] if passed else []
-    early = [_named(r, rows) for r in judged if fails_early(r)]
+    early = [_named(r, rows) for r in judged if fails_at_first_only(r)]
     return out + ([f"Over the whole run the errors of {_list(early)} are inconsistent with the covariance."] if early else [])
 
 

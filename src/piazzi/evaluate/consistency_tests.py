@@ -1,4 +1,4 @@
-"""Whether one run of an estimator is honest about its errors: the tests of `consistency`, made for an estimate."""
+"""Whether the covariance of one run is consistent with its errors: the tests of `consistency`, made for an estimate."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from piazzi.estimate import Estimate
-from piazzi.evaluate.bounds import Linearized, absorb, linearized, linearized_rows
+from piazzi.evaluate.bounds import Linearized, linearized, linearized_rows, update_covariances
 from piazzi.evaluate.consistency import Check, bias_check, nees_check, nis_check, whiteness_check
 from piazzi.evaluate.metrics import Consistency, used
 from piazzi.problem.checks import Array
@@ -17,8 +17,8 @@ LONGEST = 300_000  # epochs from which NEES is not tested: it would take more me
 
 
 @dataclass(frozen=True)
-class Honesty:
-    """What one run says about an estimator's honesty; None where there is nothing to test.
+class ConsistencyTests:
+    """What one run says about an estimator's consistency; None where there is nothing to test.
 
     A matched run passes each test with probability 0.95: exactly so for linear problems, else as nearly as the problem is
     linear over its own errors.
@@ -39,11 +39,11 @@ class Honesty:
     bias: Check | None = None
 
 
-def judged(estimate: Estimate, consistency: Consistency | None) -> Honesty:
+def check_consistency(estimate: Estimate, consistency: Consistency | None) -> ConsistencyTests:
     """The tests of an estimate, whose NEES (K,) come in `consistency`; None without truth."""
     long, one_row = len(estimate.mean) > LONGEST, int(np.diff(estimate.tracking.first_row).max()) == 1
     if not estimate.success or (long and not one_row):
-        return Honesty()
+        return ConsistencyTests()
     with np.errstate(all="ignore"):
         found = None if long else linearized(estimate.problem, estimate.tracking, estimate.mean)
         R = None if consistency is None or found is None else error_correlation(estimate, found)
@@ -51,8 +51,8 @@ def judged(estimate: Estimate, consistency: Consistency | None) -> Honesty:
     series, rows = _series(estimate, w), int((~np.isnan(w)).any(axis=1).sum())
     whole, half = _nees(consistency, R, 0), _nees(consistency, R, len(estimate.mean) // 2)
     if not np.isfinite(w[~np.isnan(w)]).all():
-        return Honesty(whole, half)
-    return Honesty(whole, half, nis_check(w, rows), whiteness_check(series), bias_check(series))
+        return ConsistencyTests(whole, half)
+    return ConsistencyTests(whole, half, nis_check(w, rows), whiteness_check(series), bias_check(series))
 
 
 def _nees(consistency: Consistency | None, R: Array | None, first: int) -> Check | None:
@@ -131,7 +131,7 @@ def own_innovations(estimate: Estimate, found: Linearized | None) -> Array:
     P = np.swapaxes(found.Phi, 1, 2)
     ahead = np.concatenate([found.predicted[:1], found.Phi @ estimate.covariance[:-1] @ P + found.noise])
     rows = linearized_rows(estimate.problem, estimate.tracking, np.vstack([found.first, found.ahead]))
-    white = absorb(ahead, np.zeros_like(estimate.mean), *rows, inputs.first_row)[0]
+    white = update_covariances(ahead, np.zeros_like(estimate.mean), *rows, inputs.first_row)[0]
     return np.where(np.isnan(nu), np.nan, white)
 
 

@@ -89,10 +89,10 @@ def _observability(
     total = _summary(factor(rows), scale)
     epochs = _epochs(inputs.epochs)
     values, directions = singular(growth(rows, inputs.first_row[epochs + 1] * inputs.z.shape[1]))
-    quiet = None
+    without_noise = None
     if problem.process_noise.covariance.any():
-        still = replace(problem, process_noise=ProcessNoise(np.zeros(len(problem.model.states)), "step"), truth=None)
-        quiet = _summary(factor(_finite(along(still, inputs, states).rows * scale)), scale)
+        noiseless = replace(problem, process_noise=ProcessNoise(np.zeros(len(problem.model.states)), "step"), truth=None)
+        without_noise = _summary(factor(_finite(along(noiseless, inputs, states).rows * scale)), scale)
     root = factor(rows)
     others = find_twins(problem, inputs, states[0], scale, root) if twins else ()
     return Observability(
@@ -103,7 +103,7 @@ def _observability(
         states[0].copy(),
         scale,
         total,
-        quiet,
+        without_noise,
         inputs.t[epochs],
         values,
         bound(values, directions) * scale,

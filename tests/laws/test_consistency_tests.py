@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
 from piazzi.evaluate.bounds import linearized, posterior_bounds
-from piazzi.evaluate.honesty import error_correlation, judged, own_innovations
+from piazzi.evaluate.consistency_tests import check_consistency, error_correlation, own_innovations
 from piazzi.evaluate.metrics import nees
 from tests.laws.problems import b612, linear, network, random_covariance, random_stable
 
@@ -191,13 +191,13 @@ def test_what_cannot_be_tested_is_none():
     estimate = pz.ExtendedKalmanFilter().estimate(problem, tracking)
     one = pz.Tracking(tracking.row_times[:2], tracking.values[:2], tracking.row_stations[:2], tracking.truth[:1])
     single = pz.ExtendedKalmanFilter().estimate(problem, one)
-    found = judged(single, nees(single))
+    found = check_consistency(single, nees(single))
     assert found.nees.effective == pytest.approx(1)
     assert found.whiteness is None
     assert found.bias is None
-    assert judged(estimate, None).nees is None
-    assert judged(estimate, None).nis is not None
-    assert judged(replace(estimate, failure="no"), nees(estimate)).nis is None
+    assert check_consistency(estimate, None).nees is None
+    assert check_consistency(estimate, None).nis is not None
+    assert check_consistency(replace(estimate, failure="no"), nees(estimate)).nis is None
 
 
 # ---- the size of the tests -----------------------------------------------------------------------------------------------
@@ -219,7 +219,7 @@ def rejected(believed: pz.Problem, estimator: pz.ExtendedKalmanFilter, view: str
     for seed in range(runs):
         estimate = estimator.estimate(believed, drawn(truth, 7000 + seed, EPOCHS))
         estimate = estimate.delayed if view == "delayed" and estimate.delayed is not None else estimate
-        found = judged(estimate, nees(estimate))
+        found = check_consistency(estimate, nees(estimate))
         out.append([not check.passed for check in (found.nees, found.nees_last_half, found.nis, found.whiteness, found.bias)])
     return dict(zip(("nees", "nees_last_half", "nis", "whiteness", "bias"), np.mean(out, axis=0).tolist(), strict=True))
 

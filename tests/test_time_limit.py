@@ -11,8 +11,8 @@ import pytest
 import sympy as sp
 
 import piazzi as pz
-from piazzi.expressions import ExpressionError, patience, symbol, to_sympy
-from piazzi.expressions.patience import TooSlowError, each_patiently, patiently
+from piazzi.expressions import ExpressionError, symbol, time_limit, to_sympy
+from piazzi.expressions.time_limit import TooSlowError, each_with_time_limit, with_time_limit
 from piazzi.kernels.generate import model_source
 from piazzi.model.derivation import derive, derive_sensor, jacobian
 from tests.waiting import HANGS
@@ -37,14 +37,14 @@ def swallow():
 
 
 def test_a_slow_equation_is_refused(monkeypatch):
-    monkeypatch.setattr(patience, "SECONDS", 0.3)
+    monkeypatch.setattr(time_limit, "SECONDS", 0.3)
     with pytest.raises(ExpressionError, match=r"SymPy needs more than 0.3 s for this: write it in a simpler way"):
         to_sympy(SLOW, {})
     assert to_sympy("x + x", {"x": symbol("x")}) == 2 * symbol("x")
 
 
 def test_so_are_slow_derivatives(monkeypatch):
-    monkeypatch.setattr(patience, "SECONDS", 0.2)
+    monkeypatch.setattr(time_limit, "SECONDS", 0.2)
 
     class Slow(sp.Function):
         def fdiff(self, argindex=1):
@@ -64,7 +64,7 @@ def test_in_threads_each_has_its_own_limit(call):
 
     def run(i):
         try:
-            return patiently(call if i % 2 else lambda: sum(range(1000)), 0.05)
+            return with_time_limit(call if i % 2 else lambda: sum(range(1000)), 0.05)
         except TooSlowError:
             return "slow"
 
@@ -76,19 +76,19 @@ def test_in_threads_each_has_its_own_limit(call):
 def test_nested_limits_end_their_own_block():
     def inner():
         with pytest.raises(TooSlowError):
-            patiently(spin, 0.05)
-        return patiently(spin, 10.0)
+            with_time_limit(spin, 0.05)
+        return with_time_limit(spin, 10.0)
 
     started = time.process_time()
     with pytest.raises(TooSlowError, match=r"more than 0\.3 s"):
-        patiently(inner, 0.3)
+        with_time_limit(inner, 0.3)
     assert time.process_time() - started < 5
 
 
 def test_errors_and_results_come_through():
     with pytest.raises(ZeroDivisionError):
-        patiently(lambda: 1 / 0, 1.0)
-    assert patiently(lambda: 7) == 7
+        with_time_limit(lambda: 1 / 0, 1.0)
+    assert with_time_limit(lambda: 7) == 7
 
 
 def test_an_end_at_the_limit_leaves_nothing_behind():
@@ -104,7 +104,7 @@ def test_an_end_at_the_limit_leaves_nothing_behind():
             return "done"
 
         try:
-            outcomes.add(patiently(call, seconds))
+            outcomes.add(with_time_limit(call, seconds))
         except TooSlowError:
             outcomes.add("slow")
         for _ in range(100):
@@ -114,7 +114,7 @@ def test_an_end_at_the_limit_leaves_nothing_behind():
 
 def test_watching_threads_end():
     for _ in range(20):
-        patiently(lambda: None)
+        with_time_limit(lambda: None)
     end = time.monotonic() + HANGS
     while any("_run" in str(t) for t in threading.enumerate()) and time.monotonic() < end:
         time.sleep(0.01)
@@ -146,9 +146,9 @@ def test_a_profiler_can_watch_what_comes_after_a_limit():
     """CPython 3.11 with a profiler stood still at the next generator, looking for an interruption that never came."""
     program = """
 import sys
-from piazzi.expressions.patience import patiently
+from piazzi.expressions.time_limit import with_time_limit
 sys.setprofile(lambda *event: None)
-patiently(lambda: None)
+with_time_limit(lambda: None)
 print(sum(i for i in range(3)))
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
@@ -162,9 +162,9 @@ def test_each_of_several_has_the_limit_for_itself():
             pass
         return seconds
 
-    assert each_patiently(work, [0.1] * 6, 0.4) == [0.1] * 6
+    assert each_with_time_limit(work, [0.1] * 6, 0.4) == [0.1] * 6
     with pytest.raises(TooSlowError) as found:
-        each_patiently(work, [0.1, 0.1, 5.0, 0.1], 0.4)
+        each_with_time_limit(work, [0.1, 0.1, 5.0, 0.1], 0.4)
     assert found.value.at == 2
 
 
@@ -182,7 +182,7 @@ def source(**changes):
     for sensor in model.sensors:
         derive_sensor(model, sensor)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(patience, "SECONDS", 0.05)
+        patch.setattr(time_limit, "SECONDS", 0.05)
         return model_source(model, pz.Taylor(2).scheme, 1)
 
 

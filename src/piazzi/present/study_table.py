@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.evaluate.grids import fits, rich_table
 from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, unit_of
 from piazzi.problem.checks import Array
 from piazzi.study import Line, Stored, Summary
@@ -42,12 +43,12 @@ def point_name(point: Mapping[str, Any]) -> str:
 
 def ideal_nees(lines: Sequence[Line]) -> str:
     """What the mean NEES should be: how many directions of the error have any variance."""
-    return ideal(x.course.ideal for x in lines)
+    return ideal(x.history.ideal for x in lines)
 
 
 def widest_bounds(lines: Sequence[Line]) -> Array | None:
     """Bounds of the mean NEES (2, T), of the line whose are the widest; None where no line has any."""
-    found = [x.course.nees_bounds for x in lines if np.isfinite(x.course.nees_bounds).any()]
+    found = [x.history.nees_bounds for x in lines if np.isfinite(x.history.nees_bounds).any()]
     return max(found, key=lambda b: float(np.nanmean(b[1] - b[0])), default=None)
 
 
@@ -67,7 +68,7 @@ def columns(summary: Summary) -> list[Column]:
         )
         ratios = tuple(number(line.over_bound[group], 3) for line in lines)
         found.append(Column(f"{name} RMSE over bound", "ideal 1", ratios, False))
-    inside = tuple(NOTHING if (i := x.course.inside) is None else f"{100 * i:.0f} %" for x in lines)
+    inside = tuple(NOTHING if (i := x.history.inside) is None else f"{100 * i:.0f} %" for x in lines)
     found += [
         Column("mean NEES", ideal_nees(lines), tuple(number(line.mean_nees_last_half, 3) for line in lines)),
         Column("median NEES", "last half", tuple(number(line.median_nees_last_half, 3) for line in lines), False),
@@ -86,12 +87,11 @@ class StudyTable:
         self._columns = columns(summary)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        from rich.measure import Measurement
         from rich.text import Text
 
         for shown in (self._columns, [c for c in self._columns if c.essential]):
             table = _table(shown)
-            if Measurement.get(console, options.update(max_width=10_000), table).maximum <= options.max_width:
+            if fits(table, console, options):
                 yield table
                 if shown is not self._columns:
                     yield Text("A wider terminal shows more.", style="dim")
@@ -103,18 +103,9 @@ class StudyTable:
 
 
 def _table(shown: list[Column]) -> Any:
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=box.SIMPLE_HEAD, header_style="bold", show_edge=False, padding=(0, 1, 0, 0))
-    numbers_from = next(i for i, c in enumerate(shown) if c.title == "view") + 1
-    for i, c in enumerate(shown):
-        heading = Text("\n".join([*c.title.split(), *filter(None, [c.unit])]))
-        table.add_column(heading, justify="right" if i >= numbers_from else "left", no_wrap=True, vertical="bottom")
-    for row in zip(*(c.texts for c in shown), strict=True):
-        table.add_row(*(Text(text) for text in row))
-    return table
+    words = next(i for i, c in enumerate(shown) if c.title == "view") + 1
+    heads = [("\n".join([*c.title.split(), *filter(None, [c.unit])]), i < words) for i, c in enumerate(shown)]
+    return rich_table(heads, zip(*(c.texts for c in shown), strict=True))
 
 
 def heading(stored: Stored) -> str:

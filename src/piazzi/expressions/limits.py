@@ -17,9 +17,21 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any, TypeAlias
 
-from piazzi.expressions.errors import ExpressionError
 from piazzi.expressions.functions import TABLE, Function
-from piazzi.expressions.language import CONSTANTS, MAX_DIGITS, Call, Name, Negative, Node, Number, Power, Product, Sum, fold
+from piazzi.expressions.language import (
+    CONSTANTS,
+    MAX_DIGITS,
+    Call,
+    ExpressionError,
+    Name,
+    Negative,
+    Node,
+    Number,
+    Power,
+    Product,
+    Sum,
+    fold,
+)
 from piazzi.expressions.parse import Equation, parse
 
 MAX_EXPONENT = 64

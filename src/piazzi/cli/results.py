@@ -1,0 +1,128 @@
+"""How commands end: the file, the page, and one object or tables on stdout."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import click
+
+from piazzi.cli import output
+from piazzi.cli.options import F
+from piazzi.cli.running import DONE, NOT_ESTIMATED
+
+if TYPE_CHECKING:
+    from piazzi.present.report import Tab
+    from piazzi.problem import Problem, Tracking
+
+
+ENDINGS = (".json", ".csv")
+PAGES = (".html", ".htm")
+
+
+class Result(Protocol):
+    """What is told of a source; rich can show it."""
+
+    @property
+    def problem(self) -> Problem: ...
+
+    @property
+    def tracking(self) -> Tracking: ...
+
+    @property
+    def source(self) -> str: ...
+
+    @property
+    def success(self) -> bool: ...
+
+    def to_dict(self) -> dict[str, Any]: ...
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What -o, --json and --report ask for."""
+
+    output_file: str | None
+    as_json: bool
+    report: str | None
+
+    def check(self) -> None:
+        """Refuse what could not be written, before anything is computed; raises click.UsageError, OSError."""
+        output.check_output(self.output_file, ENDINGS)
+        check_report(self.report)
+
+    def write(self, result: Result, rows: Callable[[], Sequence[Mapping[str, Any]]], tab: Callable[[], Tab]) -> int:
+        """Write and print a result; the exit status.
+
+        Parameters
+        ----------
+        rows : makes the records of a .csv
+        tab : makes the tab of a page
+        """
+        wrote = []
+        if self.output_file is not None:
+            self._write(self.output_file, result, rows)
+            wrote.append(f"Wrote {self.output_file}")
+        if self.report is not None:
+            wrote.append(f"Wrote {write_page(self.report, [tab()])}")
+        if self.output_file == output.STDOUT:
+            pass  # it has the object already
+        elif self.as_json:
+            output.print_json(result.to_dict())
+        else:
+            from piazzi.present.tables import heading
+
+            output.print_rich(heading(result.problem, result.tracking, result.source), "", result, *wrote)
+        return DONE if result.success else NOT_ESTIMATED
+
+    def _write(self, path: str, result: Result, rows: Callable[[], Sequence[Mapping[str, Any]]]) -> None:
+        if path == output.STDOUT or path.lower().endswith(".json"):
+            output.write_json(path, result.to_dict())
+        else:
+            output.write_csv(path, rows())
+
+
+def report_option(function: F) -> F:
+    """Option --report, naming the folder of the page."""
+    return click.option(
+        "--report",
+        "report",
+        metavar="DIR",
+        help="Write report.html into DIR: one page that works offline; DIR may end in .html.",
+    )(function)
+
+
+def check_report(path: str | None) -> None:
+    """Make the folder of the page, and refuse a place that cannot be written, before anything is computed."""
+    if path is None:
+        return
+    if not path or path == output.STDOUT:
+        raise click.UsageError(f"--report {path!r}: name a folder", click.get_current_context(silent=True))
+    from piazzi.present.report.write import page_path
+
+    target = page_path(path)
+    output.make_folder(target.parent, target.name)
+    output.check_output(str(target), PAGES)
+
+
+def title_and_planet(source: str, name: str, scenario: str | None) -> tuple[str, float | None]:
+    """Title of a problem and radius of its planet, as its scenario says; `name` and None where there is none."""
+    from piazzi.scenarios import load_scenario
+
+    text = scenario or source
+    try:  # the founding layout is that problem
+        found = load_scenario("satellite-bearing" if text.lower().endswith(".npz") else text)
+    except (ValueError, OSError):
+        return name, None
+    return found.title or name, found.picture.planet_radius
+
+
+def write_page(path: str, tabs: Sequence[Tab]) -> Path:
+    """Write the page of these tabs; returns its path."""
+    from piazzi import __version__
+    from piazzi.present.report import write_page as write
+
+    title = tabs[0].title if len(tabs) == 1 else f"{len(tabs)} problems"
+    return write(path, f"Piazzi report: {title}", tabs, foot=f"Made by Piazzi {__version__}. The page needs no network.")

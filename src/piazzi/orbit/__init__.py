@@ -1,5 +1,0 @@
-"""Orbits in closed form."""
-
-from piazzi.orbit.kepler import kepler_transition, propagate_kepler
-
-__all__ = ["kepler_transition", "propagate_kepler"]
