@@ -2,12 +2,16 @@
 
 import csv
 import json
+import os
 import re
+import sys
+import tempfile
 
 import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi.cli.output import check_place
 from piazzi.scenarios import show
 
 SCENARIO = "b612-range"
@@ -144,6 +148,21 @@ def test_output_that_cannot_be_written_is_refused_before_anything_runs(call, mon
     assert message in call(command, SCENARIO, "-o", target.format(tmp_path)).refused()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file.csv", "folder.csv"]
     assert (tmp_path / "file.csv").read_text() == "kept"
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="files without a name are Linux's")
+def test_to_try_an_output_makes_no_name(monkeypatch, tmp_path):
+    """A command that is killed meanwhile leaves nothing."""
+    real, seen = tempfile.TemporaryFile, []
+
+    def tried(**where):
+        file = real(**where)
+        seen.append(os.listdir(where["dir"]))
+        return file
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", tried)
+    check_place(os.fspath(tmp_path / "e.csv"))
+    assert seen == [[]]
 
 
 def test_a_failed_run_leaves_the_old_file(call, tmp_path):

@@ -178,7 +178,8 @@ def hdf5(data: bytes, rng: random.Random) -> bytes:
 
 
 def _variable(root: Any, name: str, rng: random.Random) -> None:
-    old = root[name][()]
+    declared = root[name].size or 0  # what was never written may be larger than any memory
+    old = root[name][()] if declared <= LARGEST else np.zeros(1)
     if old.dtype == np.dtype("S1"):
         try:
             new = np.frombuffer(json.dumps(twisted(json.loads(old.tobytes()), rng)).encode(), "S1")
@@ -204,6 +205,7 @@ def _variable(root: Any, name: str, rng: random.Random) -> None:
             root[name] = new
 
 
+LARGEST = 2**22  # numbers in a variable
 Split = Callable[[bytes], list[tuple[dict[str, Any], bytes]]]
 
 
