@@ -120,6 +120,17 @@ def test_without_truth_errors_are_null_and_the_rest_stands(good):
     assert "no truth to compare with" in str(comparison)
 
 
+@pytest.mark.parametrize("names", [["ekf"], ["ekf", "graph"]])
+def test_a_truth_that_ends_before_the_last_half_is_told(good, names):
+    """Errors are known then, but none of those that estimators are compared by."""
+    truth = good.tracking.truth.copy()
+    truth[len(truth) // 2 :] = np.nan
+    comparison = compare(good.problem, replace(good.tracking, truth=truth), names)
+    assert all(row.rmse["position"] is not None and row.rmse_last_half["position"] is None for row in comparison.rows)
+    assert "The truth of the last half of the run is not known, so its errors are unknown." in rendered(comparison, 100)
+    assert points(comparison)
+
+
 def test_numbers_that_are_not_finite_become_null(good):
     mean = good.mean.copy()
     mean[30] = np.nan

@@ -200,7 +200,9 @@ def _modes(rows: Sequence[Row]) -> list[str]:
 
 
 def _best(model: Model, rows: Sequence[Row], judged: Sequence[Row]) -> list[str]:
-    group = next(g for r in judged for g, v in r.rmse_last_half.items() if v is not None)
+    group = next((g for r in judged for g, v in r.rmse_last_half.items() if v is not None), None)
+    if group is None:
+        return ["The truth of the last half of the run is not known, so its errors are unknown."]
     ranked = [(v, r.estimator, r.view) for r in judged if (v := r.rmse_last_half.get(group)) is not None]
     show = row_display(model, rows, group)
     ranked.sort(key=lambda found: float(f"{found[0]:.3e}"))  # a difference that is not shown is no difference
