@@ -178,8 +178,10 @@ def hdf5(data: bytes, rng: random.Random) -> bytes:
 
 
 def _variable(root: Any, name: str, rng: random.Random) -> None:
-    declared = root[name].size or 0  # what was never written may be larger than any memory
-    old = root[name][()] if declared <= LARGEST else np.zeros(1)
+    if (root[name].size or 0) > LARGEST:  # declared, never written: larger than any memory
+        del root[name]
+        return
+    old = root[name][()]
     if old.dtype == np.dtype("S1"):
         try:
             new = np.frombuffer(json.dumps(twisted(json.loads(old.tobytes()), rng)).encode(), "S1")
