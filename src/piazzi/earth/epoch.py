@@ -15,8 +15,6 @@ from piazzi.earth.dates import HINT, Reading, read_date, scale_named, write_date
 from piazzi.earth.eop import tables
 from piazzi.earth.scales import Orientation
 
-_UNIX_DAY = 40587  # MJD of 1970-01-01
-
 
 @total_ordering
 @dataclass(frozen=True, init=False, repr=False)

@@ -19,7 +19,6 @@ Array = np.ndarray[Any, Any]
 
 SCALES = ("UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1")
 DAY = 86400.0
-J2000_MJD = 51544.5
 UTC_BEGINS = 36934.0  # 1960-01-01, the first day that UTC has
 TT_TAI = 32.184
 _BEHIND_TT = {"TT": (0.0, 0.0), "TAI": (32.0, 0.184), "GPS": (51.0, 0.184)}  # whole seconds and the rest
