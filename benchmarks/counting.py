@@ -18,7 +18,7 @@ import numpy as np
 import piazzi as pz
 from piazzi import kernels
 from piazzi.kernels import plain
-from piazzi.kernels.build import entry_names
+from piazzi.kernels.entries import signatures
 
 
 class Number:
@@ -120,9 +120,6 @@ class _Entry:
             if args[i].flags.writeable:
                 args[i][...] = np.array([float(v) for v in inside[i]]).reshape(args[i].shape)
 
-    def after(self, first: Any, *args: Any) -> None:
-        self(*first.arguments, *args)
-
     def bind(self, *args: Any) -> Callable[[], None]:
         return lambda: self(*args)
 
@@ -132,7 +129,7 @@ def _load(spec: Any) -> SimpleNamespace:
     body = source.replace("from piazzi.kernels.plain import *", "")
     names = _vocabulary()
     exec(compile(body, "<counted>", "exec"), names)
-    return SimpleNamespace(**{name: _Entry(names[name]) for name in entry_names(source)})
+    return SimpleNamespace(**{name: _Entry(names[name]) for name in signatures(source)})
 
 
 @contextmanager

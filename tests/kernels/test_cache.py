@@ -16,10 +16,12 @@ import pytest
 import piazzi
 import piazzi as pz
 from piazzi.kernels import KernelSpec, cache, folder, spec
+from piazzi.kernels.bundle import Given
 from tests.waiting import HANGS
 
 PACKAGE = Path(piazzi.__file__).parent
 MODEL = pz.Model(["x"], ["-k*x"], parameters=["k"])
+GIVEN = Given(parameters=np.full(1, 0.5), manoeuvres=np.zeros(1))
 SMALL = KernelSpec(MODEL, pz.Taylor(1).scheme, ("transition", "rates"))
 
 
@@ -42,15 +44,16 @@ def fresh(monkeypatch, tmp_path):
 @pytest.fixture(scope="module")
 def compiled():
     """What compiling the small kernel gives, compiled once."""
-    from piazzi.kernels.build import compile_entries, entry_names
+    from piazzi.kernels.build import compile_entries
+    from piazzi.kernels.entries import signatures
 
     kept = {}
 
-    def once(source, names):
+    def once(source):
         if not kept:
-            kept["result"] = compile_entries(source, names)
+            kept["result"] = compile_entries(source)
         once.count += 1
-        assert names == entry_names(SMALL.source("compiled"))
+        assert list(kept["result"][0]) == list(signatures(source))
         return kept["result"]
 
     return once
@@ -66,7 +69,7 @@ def builds(monkeypatch, compiled):
 
 def rate_at_two(library) -> float:
     out = np.empty(1)
-    library.evaluate_dynamics(1, np.zeros(1), np.full(1, 2.0), np.full(1, 0.5), out)
+    library.evaluate_dynamics(1, np.zeros(1), np.full((1, 1), 2.0), GIVEN, out)
     return float(out[0])
 
 
@@ -146,7 +149,7 @@ def test_damage_is_noticed_and_mended(fresh, builds, name):
 
 
 def test_a_failed_build_leaves_nothing(fresh, monkeypatch):
-    def fail(source, names):
+    def fail(source):
         raise RuntimeError("no compiler today")
 
     monkeypatch.setattr(cache, "compile_entries", fail)
@@ -352,7 +355,7 @@ def test_editing_any_source_of_a_kernel_is_noticed(monkeypatch, tmp_path):
     shutil.copytree(PACKAGE, tmp_path / "piazzi", ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(spec, "HERE", tmp_path / "piazzi" / "kernels")
     monkeypatch.setattr(spec, "_surroundings", spec._surroundings.__wrapped__)
-    monkeypatch.setattr(spec, "_fragment", spec._fragment.__wrapped__)
+    monkeypatch.setattr(spec, "_own_fragment", spec._own_fragment.__wrapped__)
     files = [f for stage in ("expressions", "model", "kernels") for f in sorted((tmp_path / "piazzi" / stage).rglob("*.py"))]
     own = {f"{name}.py" for name in SMALL.fragments}
     assert {f.name for f in files if f.parent.name == "fragments"} > own

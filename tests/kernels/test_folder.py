@@ -15,8 +15,10 @@ import pytest
 
 import piazzi as pz
 from piazzi.kernels import KernelSpec, cache, folder, ownership
+from piazzi.kernels.bundle import Given
 
 MODEL = pz.Model(["x"], ["-k*x"], parameters=["k"])
+GIVEN = Given(parameters=np.full(1, 0.5), manoeuvres=np.zeros(1))
 SMALL = KernelSpec(MODEL, pz.Taylor(1).scheme, ("transition", "rates"))
 NOBODY = 65534
 
@@ -65,8 +67,8 @@ def builds(made, monkeypatch):
     """The compilations so far, which take what was compiled once."""
     count = []
 
-    def compiled(source, names):
-        count.append(names)
+    def compiled(source):
+        count.append(source)
         home = made / SMALL.digest()
         manifest = json.loads((home / "manifest.json").read_text())
         return {n: (home / f"{n}.o").read_bytes() for n in manifest["objects"]}, manifest["symbols"]
@@ -80,7 +82,7 @@ def loads(builds) -> int:
     builds.clear()
     forget()
     out = np.empty(1)
-    cache.load(SMALL).evaluate_dynamics(1, np.zeros(1), np.full(1, 2.0), np.full(1, 0.5), out)
+    cache.load(SMALL).evaluate_dynamics(1, np.zeros(1), np.full((1, 1), 2.0), GIVEN, out)
     assert out[0] == -1.0
     return len(builds)
 

@@ -85,9 +85,10 @@ def test_every_function_of_the_language_compiles_and_loads(monkeypatch):
 
 
 def test_arrays_that_a_kernel_could_misread_are_refused():
-    from piazzi.kernels.library import POINTER, Entry
+    from piazzi.kernels.library import Entry
+    from piazzi.kernels.members import FLOATS
 
-    entry = Entry(0, (POINTER,), None)
+    entry = Entry("run", 0, (FLOATS,), {}, None)
     for array in (
         np.zeros((4, 4))[:, ::2],
         np.zeros(3, dtype=np.float32),
@@ -95,7 +96,7 @@ def test_arrays_that_a_kernel_could_misread_are_refused():
         np.zeros(3, dtype=bool),
         np.zeros(3, dtype=">f8"),
     ):
-        with pytest.raises(TypeError, match="a kernel needs contiguous float64 or int64"):
+        with pytest.raises(TypeError, match="argument 0 of kernel run must be contiguous float64"):
             entry(array)
 
 
@@ -110,7 +111,7 @@ def test_first_compilation_is_told_in_one_line(monkeypatch, caplog, tmp_path):
 
     monkeypatch.setenv("PIAZZI_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(cache, "_loaded", {})
-    monkeypatch.setattr(cache, "compile_entries", lambda source, names: ({}, {}))
+    monkeypatch.setattr(cache, "compile_entries", lambda source: ({}, {}))
     folder.private_folder.cache_clear()
     folder.writable_folder.cache_clear()
     try:

@@ -15,12 +15,13 @@ GUARD = -7.25e300  # stands around every result: nothing may be written beside i
 def call(function: Callable[..., None], *arrays: np.ndarray) -> None:
     """Compile `function` of pointers to doubles as the kernels' entries are, and call it."""
     from piazzi.kernels.compiled import Array, entry
-    from piazzi.kernels.library import POINTER, load_objects
+    from piazzi.kernels.library import load_objects
+    from piazzi.kernels.members import FLOATS
 
     function.__annotations__ = dict.fromkeys(function.__code__.co_varnames[: function.__code__.co_argcount], Array)
     compiled = entry(function)
-    symbols = {"run": (compiled.native_name, (POINTER,) * len(arrays))}
-    load_objects({"run": compiled._library.object_code()}, symbols)["run"](*arrays)
+    symbols = {"run": (compiled.native_name, (FLOATS,) * len(arrays))}
+    load_objects({"run": compiled._library.object_code()}, symbols, {})["run"](*arrays)
 
 
 class Results:

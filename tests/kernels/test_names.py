@@ -53,7 +53,7 @@ def test_the_source_of_a_build_that_failed_is_kept_and_named(tmp_path, monkeypat
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     text = "from piazzi.kernels.compiled import *\n\n\n@entry\ndef run(x: Array):\n    x[0] = nothing_of_this_name\n"
     with pytest.raises(Exception, match="nothing_of_this_name") as caught:
-        compile_entries(text, ("run",))
+        compile_entries(text)
     (kept,) = tmp_path.glob("failed-*.py")
     assert kept.read_text() == text
     assert str(kept) in "".join(traceback.format_exception(caught.value))

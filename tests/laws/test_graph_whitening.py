@@ -1,6 +1,7 @@
 """Whitening: what the graph divides its residuals by turns noise of any covariance into independent units."""
 
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def test_process_noise(n, rank, seed):
     assume(rank == 0 or np.linalg.eigvalsh(Q[:rank, :rank])[0] > 1e-3)
     L, D = np.empty(n * n), np.empty(n)
     with sizes(n):
-        graph_linearize.factor_noise(Q, L, D)
+        graph_linearize.factor_noise(Q, SimpleNamespace(L=L, D=D))
     lower = np.tril(L.reshape(n, n), -1) + np.eye(n)
     assert_allclose(lower @ np.diag(D) @ lower.T, Q, rtol=0, atol=1e-12 * max(np.abs(Q).max(), 1e-300))
     assert np.count_nonzero(D) == rank
@@ -48,13 +49,13 @@ def test_process_noise(n, rank, seed):
 def test_cost_of_a_defect_is_the_square_of_its_whitened_length(n, seed, scale):
     rng = np.random.default_rng(seed)
     Q, defect = random_covariance(rng, n), rng.standard_normal(n)
-    L, D, y, broken, report = np.empty(n * n), np.empty(n), np.empty(n), np.ones(n), np.zeros(4)
+    factor, broken, largest, total = SimpleNamespace(L=np.empty(n * n), D=np.empty(n)), np.ones(n), np.zeros(1), np.zeros(1)
     with sizes(n):
-        graph_linearize.factor_noise(Q, L, D)
-        graph_linearize.weigh(defect, scale, L, D, 0, np.eye(n).ravel(), y, broken, report, 1)
+        graph_linearize.factor_noise(Q, factor)
+        graph_linearize.weigh(defect, scale, factor, 0, np.eye(n).ravel(), broken, largest, total)
     white = np.linalg.solve(np.linalg.cholesky(scale * Q), defect)
-    assert_allclose(report[1], white @ white, rtol=1e-8)
-    assert report[3] == 0.0
+    assert_allclose(total, white @ white, rtol=1e-8)
+    assert largest == 0.0
     assert not broken.any()
 
 

@@ -35,9 +35,9 @@ def test_a_tracking_of_two_problems_is_laid_out_for_each():
 def test_addresses_stay_in_their_process():
     problem, tracking = pz.load("b612-range")
     inputs = prepare(problem, tracking)
-    inputs.run_of(problem)
+    inputs.bundles(problem)
     for thing in (tracking, inputs, problem):
-        assert {"_prepared", "_run", "specs"}.isdisjoint(vars(pickle.loads(pickle.dumps(thing))))
+        assert {"_prepared", "_bundles", "specs"}.isdisjoint(vars(pickle.loads(pickle.dumps(thing))))
     again = pickle.loads(pickle.dumps((problem, tracking)))
     estimator = pz.ExtendedKalmanFilter()
     assert_array_equal(estimator.estimate(*again).mean, estimator.estimate(problem, tracking).mean)

@@ -107,14 +107,6 @@ def test_company_changes_no_bit(runs):
         assert_array_equal(getattr(scores_again, name), getattr(scores, name)[part], err_msg=name)
 
 
-def test_scoring_changes_no_bit():
-    layout, _, z, (mean, P, _) = runs_of("satellite")
-    bare, covariance, scores = filter_runs(layout, z)
-    assert scores is None
-    assert_array_equal(bare, mean)
-    assert_array_equal(covariance, P)
-
-
 def test_bound_is_the_riccati_recursion_at_the_truth():
     """The textbook recursion with F and H at the true states (Van Trees and Bell 2007; Tichavsky et al. 1998)."""
     layout, truth, z, _ = runs_of("satellite")

@@ -33,7 +33,9 @@ class ShootingSolver(BorderedSolver):
         super().__init__(chain)
         i, self.x = chain.inputs, np.empty_like(chain.x)
         library = kernels.load(chain.problem.spec("transition", "propagate"))
-        self._propagate: Callable[[], None] = library.run_propagation.bind(i.epochs, i.t, i.count, chain.problem.given, self.x)
+        self._propagate: Callable[[], None] = library.run_propagation.bind(
+            i.epochs, i.t, i.count, chain.problem.given_bundle, self.x
+        )
 
     def begin(self, states: Array) -> Array:
         return self._orbit(states[0])

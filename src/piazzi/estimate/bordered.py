@@ -7,8 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.chain import GRADIENT, STEP, STEP_SMOOTHED, WIDEST, Chain, solve_spec
-from piazzi.kernels import KernelSpec
+from piazzi.estimate.chain import GRADIENT, NO_LOSS, STEP, STEP_SMOOTHED, WIDEST, Chain, smoothed_covariances, solve_spec
+from piazzi.kernels import KernelSpec, bundle
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
@@ -49,20 +49,47 @@ class BorderedSolver:
         self.nd, self.C, self.size = nd, C, n
         inner = solve_spec(nd, M, problem.noise_varies)
         self.border, self.inner = kernels.load(border_spec(inner)), kernels.load(inner)
-        self.root = root_of(problem.covariance[:nd, :nd])
         self.sigma = np.sqrt(np.diag(problem.covariance)[nd:]) if C else np.zeros(1)
-        self.Q = np.ascontiguousarray(problem.process_noise.covariance[:nd, :nd])
-        self.tether = np.ascontiguousarray(chain.tether[:nd, :nd])
-        self.A, self.B = np.empty((K, nd, nd)), np.zeros((K, max(C, 1), nd))
-        self.G, self.H = np.zeros((J, M, max(C, 1))), np.empty((J, M, nd))
-        self.Q_all = np.empty((len(chain.Q_all), nd, nd))
-        self.inverse, self.b = np.empty((n, n)), np.zeros(n)
-        self.space = (np.empty((n, n)), np.empty(n), np.empty((n, nd)), np.empty(n), self.inverse, np.empty((n, n)))
-        self.own = np.empty((nd, nd))
-        rows = i.most_rows * M + nd
-        self.d, self.P = np.empty((K, nd)), np.empty((K, nd, nd))
-        self.P_last, self.gains = np.empty((nd, nd)), np.empty((rows, nd + 1))
-        self.multiplier, self.dx = np.empty((K, nd)), np.empty((K, nd))
+        self.offset = np.zeros(max(C, 1))
+        self.P_last = np.empty((nd, nd))
+        Q = np.ascontiguousarray(problem.process_noise.covariance[:nd, :nd])
+        self.run = bundle.Run(epochs=K, t_prior=i.t_prior, t=i.t, count=i.count, scale=i.scale, first_row=i.first_row, Q=Q)
+        self.states = bundle.Chain(
+            x=np.empty((K, nd)),
+            f=np.empty((K, nd)),
+            Phi=np.empty((K, nd, nd)),
+            Q_all=np.empty((len(chain.Q_all), nd, nd)),
+            nu=np.empty((J, M)),
+            H=np.empty((J, M, nd)),
+            d_pred=np.empty((K, nd)),
+            P_pred=np.empty((K, nd, nd)),
+            gains=np.empty((i.most_rows * M + nd, nd + 1)),
+            multiplier=np.empty((K, nd)),
+            dx=np.empty((K, nd)),
+            scaling=np.ascontiguousarray(chain.scaling[:nd, :nd]),
+            loss=NO_LOSS,
+            weights=NO_LOSS,
+        )
+        self.unknowns = bundle.Border(
+            constants=C,
+            root=root_of(problem.covariance[:nd, :nd]),
+            offset=self.offset,
+            sigma=self.sigma,
+            A=self.states.Phi,
+            B=np.zeros((K, max(C, 1), nd)),
+            G=np.zeros((J, M, max(C, 1))),
+            R=np.empty((n, n)),
+            y=np.empty(n),
+            S=np.empty((n, nd)),
+            row=np.empty(n),
+            inverse=np.empty((n, n)),
+            W=np.empty((n, n)),
+            own=np.empty((nd, nd)),
+        )
+        self.b = np.zeros(n)
+        self.whole = bundle.Whole(
+            mean=chain.d_pred, covariance=chain.P_pred, unknowns=self.b, widest=chain.report[WIDEST : WIDEST + 1]
+        )
 
     @staticmethod
     def applies(problem: Problem) -> bool:
@@ -85,45 +112,36 @@ class BorderedSolver:
 
     @np.errstate(all="ignore")
     def solve(self, damping: float) -> None:
-        c, i, nd = self.chain, self.chain.inputs, self.nd
+        c, nd, states = self.chain, self.nd, self.states
         self._split()
-        offset = np.zeros(1) if not self.C else c.problem.mean[nd:] - c.x[0, nd:]
-        defect = np.zeros((i.epochs, nd))
+        if self.C:
+            self.offset[:] = c.problem.mean[nd:] - c.x[0, nd:]
+        start, defect = c.problem.mean[:nd] - c.x[0, :nd], np.zeros((len(c.x), nd))
         defect[1:] = c.f[:-1, :nd] - c.x[1:, :nd]
-        self.border.border_solve(
-            i.epochs, self.C, i.scale, i.first_row, self.Q, self.Q_all, c.problem.mean[:nd] - c.x[0, :nd], self.root, offset,
-            self.sigma, defect, self.A, self.B, c.nu, self.H, self.G, float(damping), self.tether, *self.space, self.own,
-            self.b, c.d_pred, c.P_pred, c.report,
-        )  # fmt: skip
-        constants = offset + self.sigma * self.b[nd:] if self.C else offset
-        self._solve_chain(c.problem.mean[:nd] + self.b[:nd] @ self.root, constants, damping)
-        c.dx[:, :nd], c.multiplier[:, :nd] = self.dx, self.multiplier
+        self.border.border_solve(self.run, start, defect, states, self.unknowns, self.whole, float(damping))
+        constants = self.offset + self.sigma * self.b[nd:] if self.C else self.offset
+        states.x[:] = c.x[:, :nd]
+        states.f[:] = c.f[:, :nd] + constants @ self.unknowns.B
+        states.nu[:] = c.nu - self.unknowns.G @ constants
+        first = bundle.Belief(mean=c.problem.mean[:nd] + self.b[:nd] @ self.unknowns.root, covariance=np.zeros((nd, nd)))
+        self.inner.graph_solve(self.run, first, states, self.P_last, c.figures, float(damping))
+        c.dx[:, :nd], c.multiplier[:, :nd] = states.dx, states.multiplier
         if self.C:
             c.dx[:, nd:], c.multiplier[:, nd:] = constants, 0.0
         c.report[GRADIENT] = c.change(c.dx) ** 2
         c.report[STEP] = c.largest_step(c.P_pred)
 
     def _split(self) -> None:
-        """Derivatives by the states apart from those by the constants."""
-        c, nd = self.chain, self.nd
-        self.A[:], self.H[:] = c.Phi[:, :nd, :nd], c.H[:, :, :nd]
+        """Innovations, and derivatives by the states apart from those by the constants."""
+        c, nd, states = self.chain, self.nd, self.states
+        states.nu[:], states.H[:], states.Phi[:] = c.nu, c.H[:, :, :nd], c.Phi[:, :nd, :nd]
         if c.problem.noise_varies:
-            self.Q_all[:] = c.Q_all[:, :nd, :nd]
+            states.Q_all[:] = c.Q_all[:, :nd, :nd]
         if self.C:
-            self.B[:], self.G[:] = c.Phi[:, :nd, nd:].transpose(0, 2, 1), c.H[:, :, nd:]
-
-    def _solve_chain(self, first: Array, constants: Array, damping: float) -> None:
-        """Deviations of the states for a given first state and given changes of the constants."""
-        c, i, nd = self.chain, self.chain.inputs, self.nd
-        f, nu = c.f[:, :nd] + constants @ self.B, c.nu - self.G @ constants
-        self.inner.graph_solve(
-            i.epochs, i.scale, i.first_row, self.Q, first, np.zeros((nd, nd)), np.ascontiguousarray(c.x[:, :nd]), f, self.A,
-            self.Q_all, nu, self.H, self.tether, self.d, self.P, self.P_last, self.gains, self.multiplier, self.dx,
-            c.report, float(damping),
-        )  # fmt: skip
+            self.unknowns.B[:], self.unknowns.G[:] = c.Phi[:, :nd, nd:].transpose(0, 2, 1), c.H[:, :, nd:]
 
     def of_constants(self) -> Array:
-        root = self.sigma[:, None] * self.inverse[self.nd :, self.nd :]
+        root = self.sigma[:, None] * self.unknowns.inverse[self.nd :, self.nd :]
         return np.asarray(root @ root.T)
 
     def marginals(self) -> Array:
@@ -137,32 +155,27 @@ class BorderedSolver:
 
     def factors(self) -> Array:
         """W (K, n, n) such that W W^T is the covariance of states and constants that comes from the border's unknowns."""
-        c, i, nd, n = self.chain, self.chain.inputs, self.nd, self.size
-        K, J, M = i.epochs, len(i.z), c.problem.model.width
-        S = np.empty((n, K, nd))
-        self.border.border_sensitivities(
-            K, self.C, i.scale, i.first_row, self.Q, self.Q_all, self.root, self.sigma, self.A, self.B, c.nu, self.H, self.G,
-            np.zeros((K, nd)), np.empty((K, nd)), np.empty((J, M)), self.tether, np.empty((K, nd)), np.empty((K, nd, nd)),
-            self.gains, np.empty((K, nd)), S,
-        )  # fmt: skip
-        W = np.empty((K, n, n))
-        W[:, :nd] = S.transpose(1, 2, 0) @ self.inverse
+        nd, n, states = self.nd, self.size, self.states
+        own = ("x", "f", "nu", "d_pred", "P_pred", "gains", "multiplier", "dx")  # the solution stays as it is
+        members = dict(zip(states.slots, states.members, strict=True))
+        alone = bundle.Chain(**{name: np.zeros_like(a) if name in own else a for name, a in members.items()})
+        S = np.empty((n, len(states.x), nd))
+        self.border.border_sensitivities(self.run, alone, self.unknowns, states.nu, S)
+        W = np.empty((len(states.x), n, n))
+        W[:, :nd] = S.transpose(1, 2, 0) @ self.unknowns.inverse
         if self.C:
-            W[:, nd:] = self.sigma[:, None] * self.inverse[nd:]
+            W[:, nd:] = self.sigma[:, None] * self.unknowns.inverse[nd:]
         return W
 
     @np.errstate(all="ignore")  # iterations that fail end in what is not finite, which the result tells
     def _covariances(self, keep_cross: bool) -> tuple[Array, Array]:
         """Covariances of all values (K, n, n), and of each state with the next (K - 1, n, n)."""
-        c, i, nd = self.chain, self.chain.inputs, self.nd
-        P, cross = np.empty((i.epochs, nd, nd)), np.zeros((max(i.epochs - 1, 1), nd, nd))
-        self.inner.graph_marginals(
-            i.epochs, i.scale, i.first_row, self.Q, self.A, self.Q_all, c.nu, self.H, self.P, self.P_last,
-            int(keep_cross), self.dx, P, cross, c.report,
-        )  # fmt: skip
+        nd = self.nd
+        P, cross = smoothed_covariances(self.inner, self.run, self.states, self.P_last, self.chain.figures, keep_cross)
         W = self.factors()
         covariance = W @ W.transpose(0, 2, 1)
         covariance[:, :nd, :nd] += P
         between = W[:-1] @ W[1:].transpose(0, 2, 1)
-        between[:, :nd, :nd] += cross[: len(between)]
+        if keep_cross:
+            between[:, :nd, :nd] += cross
         return 0.5 * (covariance + covariance.transpose(0, 2, 1)), between

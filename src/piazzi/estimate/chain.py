@@ -4,20 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from piazzi import kernels
-from piazzi.kernels import Discrete, KernelSpec
+from piazzi.kernels import Discrete, KernelSpec, bundle
 from piazzi.kernels.spec import lanes_for
 from piazzi.model import Model, Sensor
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs
 
-# slots of the kernels' report
+# places in the report of a chain
 MEASUREMENT, DYNAMICS, PRIOR, DEFECT, GRADIENT, FIT, STEP, STEP_SMOOTHED, WIDEST = range(9)
+
+
+NO_LOSS = np.zeros(1)
+
+
+def report_of(figures: Array) -> bundle.Report:
+    """Figures (9,) as kernels write them."""
+    return bundle.Report(**{name: figures[i : i + 1] for i, name in enumerate(bundle.Report.slots)})
 
 
 def chain_fragments(problem: Problem, *last: str) -> tuple[str, ...]:
@@ -61,7 +69,7 @@ def _solve_spec(n: int, width: int, noise_varies: bool, lanes: int) -> KernelSpe
     return KernelSpec(sizes, Discrete().scheme, ("matrices", noise, "chain", "semidefinite", "marginals", "graph"), lanes)
 
 
-def tether_of(problem: Problem) -> Array:
+def scaling_of(problem: Problem) -> Array:
     """One over the prior sigma of each value, as a diagonal (n, n); 1 where the prior is certain."""
     sigma = np.sqrt(np.diag(problem.covariance))
     return np.diag(1.0 / np.where(sigma > 0, sigma, 1.0))
@@ -84,42 +92,41 @@ class Chain:
         self.nu, self.H = np.empty((J, M)), np.zeros((J, M, N))  # no row of H is made for what a sensor does not have
         self.d_pred, self.P_pred = np.empty((K, N)), np.empty((K, N, N))
         self.multiplier, self.dx = np.zeros((K, N)), np.empty((K, N))
+        self.gains, self.scaling = np.empty((inputs.most_rows * M + N, N + 1)), scaling_of(problem)
         self.broken, self.report = np.zeros((K, N)), np.zeros(9)
-        self.tether = tether_of(problem)
-        self._linearize = self._bind_linearize()
+        self.run, p, measured, self.prior = inputs.bundles(problem)
+        self.linear, self.figures = self._bundle(self.Q_all), report_of(self.report)
+        self._linearize: Callable[[], None] = self.library.graph_linearize.bind(
+            self.run, p, measured, self.prior, self.linear, self.broken, self.figures
+        )
         if problem.noise_varies:
             self._bind_weigh()
 
-    def _bind_linearize(self) -> Callable[[], None]:
-        i, p = self.inputs, self.problem
-        bound: Callable[[], None] = self.library.graph_linearize.bind(
-            i.epochs,
-            i.t,
-            i.count,
-            i.scale,
-            *i.measured(p),
-            p.given,
-            p.process_noise.covariance,
-            p.mean,
-            p.covariance,
-            self.x,
-            self.f,
-            self.Phi,
-            self.Q_all,
-            self.nu,
-            self.H,
-            self.tether,
-            self.broken,
-            self.report,
+    def _bundle(self, Q_all: Array) -> bundle.Chain:
+        """The arrays for kernels, with this process noise of each step."""
+        return bundle.Chain(
+            x=self.x,
+            f=self.f,
+            Phi=self.Phi,
+            Q_all=Q_all,
+            nu=self.nu,
+            H=self.H,
+            d_pred=self.d_pred,
+            P_pred=self.P_pred,
+            gains=self.gains,
+            multiplier=self.multiplier,
+            dx=self.dx,
+            scaling=self.scaling,
+            loss=NO_LOSS,
+            weights=NO_LOSS,
         )
-        return bound
 
     def _bind_weigh(self) -> None:
         """What judges a step by the process noise that it was solved with, where that depends on the states."""
-        i, Q = self.inputs, self.problem.process_noise.covariance
         self.Q_before, self.broken_now, self._weighed = np.empty_like(self.Q_all), np.zeros_like(self.x), np.zeros(9)
+        solved = self._bundle(self.Q_before)
         self._weigh: Callable[[], None] = self.library.graph_weigh.bind(
-            i.epochs, i.scale, Q, self.x, self.f, self.Q_before, self.tether, self.broken_now, self._weighed
+            self.run, solved, self.broken_now, report_of(self._weighed)
         )
 
     def linearize(self) -> float:
@@ -186,21 +193,10 @@ class Chain:
 
     def _differences(self, d: Array, P: Array, step: int) -> tuple[Array, Array]:
         """z - h(x) - H d and H P H^T + R of all rows; from epoch to epoch, d and P go on by so many entries."""
-        i, M = self.inputs, self.problem.model.width
-        nu, S = np.empty((len(i.z), M)), np.empty((len(i.z), M, M))
-        self.library.graph_innovations(
-            i.epochs,
-            i.t,
-            *i.measured(self.problem),
-            self.problem.given,
-            self.x,
-            d,
-            P,
-            step,
-            nu,
-            S,
-        )
-        return nu, S
+        innovations = bundle.Innovations.empty(J=len(self.inputs.z), M=self.problem.model.width)
+        run, p, measured, _ = self.inputs.bundles(self.problem)
+        self.library.graph_innovations(run, p, measured, self.x, d, P, step, innovations)
+        return innovations.members  # type: ignore[no-any-return]
 
 
 class Solver(Protocol):
@@ -239,30 +235,8 @@ class CovarianceSolver:
         self.chain = chain
         model = chain.problem.model
         self.kernels = kernels.load(solve_spec(model.n, model.width, chain.problem.noise_varies))
-        c, i, p, N = chain, chain.inputs, chain.problem, model.n
-        self.gains, self.P_last = np.empty((i.most_rows * model.width + N, N + 1)), np.empty((N, N))
-        self._linearized = kernels.ready(
-            i.epochs,
-            i.scale,
-            i.first_row,
-            p.process_noise.covariance,
-            p.mean,
-            p.covariance,
-            c.x,
-            c.f,
-            c.Phi,
-            c.Q_all,
-            c.nu,
-            c.H,
-            c.tether,
-            c.d_pred,
-            c.P_pred,
-            self.P_last,
-            self.gains,
-            c.multiplier,
-            c.dx,
-            c.report,
-        )
+        self.P_last = np.empty((model.n, model.n))
+        self._solve = chain.run, chain.prior, chain.linear, self.P_last, chain.figures
 
     def begin(self, states: Array) -> Array:
         return states
@@ -271,44 +245,31 @@ class CovarianceSolver:
         return states + step
 
     def widest(self) -> float:
-        c, i = self.chain, self.chain.inputs
-        self.kernels.graph_probe(i.epochs, i.first_row, c.nu, c.H, c.P_pred, c.report)
+        c = self.chain
+        self.kernels.graph_probe(c.run, c.linear, c.figures)
         return float(c.report[WIDEST])
 
     def solve(self, damping: float) -> None:
-        self.kernels.graph_solve.after(self._linearized, float(damping))
+        self.kernels.graph_solve(*self._solve, float(damping))
 
     def of_constants(self) -> Array:
         c = slice(len(self.chain.problem.model.moving), None)
         return self.P_last[c, c]
 
     def marginals(self) -> Array:
-        return self._marginals(np.empty((1, 1)), keep_cross=False)
+        return smoothed_covariances(self.kernels, self.chain.run, self.chain.linear, self.P_last, self.chain.figures)[0]
 
     def cross(self) -> Array:
-        N = self.chain.problem.model.n
-        out = np.empty((self.chain.inputs.epochs - 1, N, N))
-        self._marginals(out, keep_cross=True)
-        return out
+        c = self.chain
+        return smoothed_covariances(self.kernels, c.run, c.linear, self.P_last, c.figures, keep_cross=True)[1]
 
-    def _marginals(self, cross: Array, keep_cross: bool) -> Array:
-        c, i, N = self.chain, self.chain.inputs, self.chain.problem.model.n
-        covariance = np.empty((i.epochs, N, N))
-        self.kernels.graph_marginals(
-            i.epochs,
-            i.scale,
-            i.first_row,
-            c.problem.process_noise.covariance,
-            c.Phi,
-            c.Q_all,
-            c.nu,
-            c.H,
-            c.P_pred,
-            self.P_last,
-            int(keep_cross),
-            c.dx,
-            covariance,
-            cross,
-            c.report,
-        )
-        return covariance
+
+def smoothed_covariances(
+    library: Any, run: bundle.Run, linear: bundle.Chain, P_last: Array, figures: bundle.Report, keep_cross: bool = False
+) -> tuple[Array, Array]:
+    """Covariances of all states (K, n, n), and of each with the next (K - 1, n, n) where wanted."""
+    covariance, mean = np.empty_like(linear.P_pred), linear.dx
+    cross = np.empty((len(mean) - 1 if keep_cross else 1, *covariance.shape[1:]))
+    smoothed = bundle.Smoothed(mean=mean, covariance=covariance, keep_cross=int(keep_cross), cross=cross)
+    library.graph_marginals(run, linear, P_last, smoothed, figures)
+    return covariance, cross

@@ -11,6 +11,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.considered import STEP, has_considered, moved
 from piazzi.estimate.soundness import defect
+from piazzi.kernels.bundle import Belief, Beliefs, Run
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, Locked, numeric
 
@@ -95,19 +96,14 @@ def forecast(estimate: Estimate, times: Any) -> Forecast:
 
 def _carried(problem: Problem, way: tuple[Any, ...], x: Array, P: Array) -> tuple[Array, Array]:
     """Means (P, n) and covariances (P, n, n) at the times of `way`."""
-    count, n = len(way[0]), problem.model.n
-    mean, covariance = np.empty((count, n)), np.empty((count, n, n))
-    kernels.load(problem.spec("transition", problem.noise_fragment, "forecast")).run_forecast(
-        count,
-        *way,
-        problem.given,
-        problem.process_noise.covariance,
-        np.ascontiguousarray(x),
-        np.ascontiguousarray(P),
-        mean,
-        covariance,
-    )
-    return mean, covariance
+    (t, start, parts, count, scale), n = way, problem.model.n
+    first_row, Q = np.zeros(len(t) + 1, dtype=np.int64), problem.process_noise.covariance
+    run = Run(epochs=len(t), t_prior=start, t=t, count=count, scale=scale, first_row=first_row, Q=Q)
+    last = Belief(mean=np.ascontiguousarray(x), covariance=np.ascontiguousarray(P))
+    beliefs = Beliefs.empty(K=len(t), N=n)
+    library = kernels.load(problem.spec("transition", problem.noise_fragment, "forecast"))
+    library.run_forecast(run, parts, problem.given_bundle, last, beliefs)
+    return beliefs.members  # type: ignore[no-any-return]
 
 
 def _sigma(covariance: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,9 +13,10 @@ from piazzi import kernels
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.live import LiveFilter, checked_measurement
 from piazzi.estimate.saved import Saved
+from piazzi.kernels.bundle import Beliefs, Gate, Innovations
 from piazzi.problem import Problem
-from piazzi.problem.checks import Array
-from piazzi.problem.inputs import Inputs
+from piazzi.problem.checks import Array, frozen
+from piazzi.problem.inputs import Inputs, epoch_alone, measured_by
 
 
 def check_gate(gate: float | None) -> None:
@@ -32,9 +34,17 @@ class Guard:
 
     def thresholds(self, width: int) -> Array:
         """Largest nu^T S^-1 nu of a row with 0, 1, ..., `width` components, (width + 1,)."""
-        if self.gate is None:
-            return np.full(width + 1, np.inf)
-        return np.array([np.inf, *(quantile(self.gate, m) for m in range(1, width + 1))])
+        return _thresholds(self.gate, width)
+
+    def bundle(self, rows: int, width: int) -> Gate:
+        """The same for kernels, with nothing rejected so far."""
+        limits, rejected = self.thresholds(width), np.zeros(rows, dtype=np.int64)
+        return Gate(iterations=self.iterations, limits=limits, rejected=rejected)
+
+
+@lru_cache(maxsize=100)
+def _thresholds(gate: float | None, width: int) -> Array:
+    return frozen([np.inf, *(np.inf if gate is None else quantile(gate, m) for m in range(1, width + 1))])
 
 
 def guarded_run(problem: Problem, inputs: Inputs, fragments: tuple[str, ...], guard: Guard) -> tuple[Array, ...]:
@@ -42,29 +52,10 @@ def guarded_run(problem: Problem, inputs: Inputs, fragments: tuple[str, ...], gu
     parts = ("transition", problem.noise_fragment, *fragments, "epoch_guarded", "filter_guarded")
     library = kernels.load(problem.spec(*parts))
     K, n, (J, m) = inputs.epochs, problem.model.n, inputs.z.shape
-    mean, P = np.empty((K, n)), np.empty((K, n, n))
-    nu, S = np.empty((J, m)), np.empty((J, m, m))
-    rejected = np.zeros(J, dtype=np.int64)
-    library.run_guarded_filter(
-        K,
-        inputs.t,
-        inputs.t_prior,
-        inputs.count,
-        inputs.scale,
-        *inputs.measured(problem),
-        problem.given,
-        problem.process_noise.covariance,
-        problem.mean,
-        problem.covariance,
-        guard.iterations,
-        guard.thresholds(m),
-        rejected,
-        mean,
-        P,
-        nu,
-        S,
-    )
-    return mean, P, nu, S, rejected
+    beliefs, innovations = Beliefs.empty(K=K, N=n), Innovations.empty(J=J, M=m)
+    gate = guard.bundle(J, m)
+    library.run_guarded_filter(*inputs.bundles(problem), gate, beliefs, innovations)
+    return (*beliefs.members, *innovations.members, gate.rejected)
 
 
 class GuardedLiveFilter(LiveFilter):
@@ -84,7 +75,7 @@ class GuardedLiveFilter(LiveFilter):
         m = problem.model.width
         parts = ("transition", problem.noise_fragment, *fragments, "epoch_guarded", "filter_live_guarded")
         self._library = kernels.load(problem.spec(*parts))
-        self._settings, self._guard, self._thresholds = (fragments, guard), guard, guard.thresholds(m)
+        self._settings, self._guard = (fragments, guard), guard
         self._values, self._rows_of = np.empty((0, m)), np.empty(0, dtype=np.int64)
         self.rejected = False
 
@@ -95,7 +86,7 @@ class GuardedLiveFilter(LiveFilter):
             self._values, self._rows_of = self._values[:0], self._rows_of[:0]
 
     def update(self, station: str, z: Any, t: float | None = None) -> None:
-        s = checked_measurement(self.problem, self._stations, station, z, self._row)
+        s = checked_measurement(self.problem, self._stations, station, z, self._row[0])
         if t is not None:
             self.predict(t)
         elif self._predicted_to is None:
@@ -105,31 +96,19 @@ class GuardedLiveFilter(LiveFilter):
         self._values = np.vstack([self._values, self._row])
         self._rows_of = np.append(self._rows_of, np.int64(s))
         rows, m = self._values.shape
-        rejected, nu, S = np.zeros(rows, dtype=np.int64), np.empty((rows, m)), np.empty((rows, m, m))
-        p = self.problem
+        gate, innovations = self._guard.bundle(rows, m), Innovations.empty(J=rows, M=m)
         self._library.live_update_guarded(
-            rows,
-            self._times,
-            self._values,
-            self._rows_of,
-            p.station_sensor,
-            p.station_numbers,
-            p.station_noise,
-            p.station_correlated,
-            p.given,
-            self._guard.iterations,
-            self._thresholds,
-            rejected,
-            self._x_pred,
-            self._P_pred,
-            self.mean,
-            self.covariance,
-            nu,
-            S,
+            epoch_alone(self.problem, float(self._times[3]), rows),
+            self.problem.given_bundle,
+            measured_by(self.problem, self._values, self._rows_of),
+            gate,
+            self._predicted,
+            self._now,
+            innovations,
             self.widest,
         )
-        self.innovation[:], self.innovation_covariance[:] = nu[-1], S[-1]
-        self.rejected, self._measured = bool(rejected[-1]), True
+        self.innovation[:], self.innovation_covariance[:] = innovations.nu[-1], innovations.S[-1]
+        self.rejected, self._measured = bool(gate.rejected[-1]), True
 
     def _kept(self) -> dict[str, Array]:
         return super()._kept() | {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}

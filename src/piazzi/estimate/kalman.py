@@ -17,9 +17,10 @@ from piazzi.estimate.guarded import Guard, GuardedLiveFilter, check_gate, guarde
 from piazzi.estimate.live import LiveFilter
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.estimate.width import TOO_WIDE, too_wide
+from piazzi.kernels.bundle import Belief, Beliefs, Innovations, Interval
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
-from piazzi.problem.inputs import Inputs, prepare
+from piazzi.problem.inputs import Inputs, measured_by, prepare
 
 Update = Literal["auto", "joint", "components"]
 
@@ -128,10 +129,11 @@ def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tup
         spec = problem.specs[kind] = problem.spec(*fragments)
     library = kernels.load(spec)
     K, n, (J, m) = len(inputs.t), len(problem.mean), inputs.z.shape
-    mean, P, nu, S = np.empty((K, n)), np.empty((K, n, n)), np.empty((J, m)), np.empty((J, m, m))
+    beliefs, innovations = Beliefs.empty(K=K, N=n), Innovations.empty(J=J, M=m)
     started = time.perf_counter()
-    library.run_filter.after(inputs.run_of(problem), mean, P, nu, S)
+    library.run_filter(*inputs.bundles(problem), beliefs, innovations)
     seconds = time.perf_counter() - started
+    (mean, P), (nu, S) = beliefs.members, innovations.members
     if not isfinite(mean.item(0)):  # a failed update leaves no number of the state
         check_start(problem, inputs, mean[0])
     return mean, P, nu, S, seconds
@@ -182,7 +184,9 @@ def predict(problem: Problem, belief: Any, t: float, dt: float) -> Prediction:
     count, scale = int(problem.integrator.counts(interval)[0]), float(problem.process_noise.scale(interval)[0])
     Phi, Q = np.empty_like(P), np.empty_like(P)
     library = kernels.load(problem.spec("transition", problem.noise_fragment, "predict"))
-    library.predict_once(float(t), float(dt), count, scale, problem.given, problem.process_noise.covariance, x, P, Phi, Q)
+    belief, noise = Belief(mean=x, covariance=P), problem.process_noise.covariance
+    span = Interval(t=float(t), dt=float(dt), count=count, scale=scale)
+    library.predict_once(span, problem.given_bundle, noise, belief, Phi, Q)
     return Prediction(x, P, Phi, Q)
 
 
@@ -202,22 +206,10 @@ def update(problem: Problem, belief: Any, station: str, z: Any, t: float = 0.0, 
         raise ValueError(f"measurement of station {station!r} is {z!r}; it must be {width} numbers, NaN where missing")
     row = np.full((1, m), np.nan)
     row[0, :width] = values
-    nu, S = np.empty((1, m)), np.empty((1, m, m))
+    innovations, measured = Innovations.empty(J=1, M=m), measured_by(problem, row, np.array([s]))
     library = kernels.load(problem.spec("transition", *update_fragments(problem, method), "update"))
-    library.update_once(
-        s,
-        float(t),
-        row,
-        problem.station_sensor,
-        problem.station_numbers,
-        problem.station_noise,
-        problem.station_correlated,
-        problem.given,
-        x,
-        P,
-        nu,
-        S,
-    )
+    library.update_once(float(t), problem.given_bundle, measured, Belief(mean=x, covariance=P), innovations)
+    nu, S = innovations.members
     return Updated(x, P, nu[0, :width], S[0, :width, :width])
 
 

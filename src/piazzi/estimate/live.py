@@ -12,9 +12,10 @@ from piazzi import kernels
 from piazzi.estimate.saved import Saved
 from piazzi.estimate.session import Session
 from piazzi.estimate.width import told
+from piazzi.kernels.bundle import Belief, Innovations
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, check_span
-from piazzi.problem.inputs import unresolved
+from piazzi.problem.inputs import measured_by, unresolved
 from piazzi.problem.manoeuvres import check_after
 
 
@@ -134,37 +135,27 @@ class LiveFilter(Session):
         self._d, self._P = np.zeros(n), problem.covariance.copy()
         self.innovation, self.innovation_covariance = np.full(m, np.nan), np.full((m, m), np.nan)
         self.widest = np.zeros(1)  # largest predicted variance of a measurement so far, in units of its noise
-        self._times, self._count, self._which = np.zeros(4), np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+        self._times, self._count, self._which = np.zeros(4), np.array([1]), np.array([0])
         self._times[3] = problem.prior_time or 0.0  # measurements before any prediction are at the time of the prior
-        self._row, self._predicted_to, self._measured = np.full(m, np.nan), problem.prior_time, False
+        self._row, self._predicted_to, self._measured = np.full((1, m), np.nan), problem.prior_time, False
         library = kernels.load(problem.spec("transition", problem.noise_fragment, *fragments, "filter_live"))
-        self._predict = library.live_predict.bind(
-            self._times,
-            self._count,
-            problem.given,
+        base = Belief(mean=self._base_mean, covariance=self._base_covariance)
+        self._predicted = Belief(mean=self._x_pred, covariance=self._P_pred)
+        correction = Belief(mean=self._d, covariance=self._P)
+        self._now = Belief(mean=self.mean, covariance=self.covariance)
+        Q, innovations = (
             problem.process_noise.covariance,
-            self._base_mean,
-            self._base_covariance,
-            self._x_pred,
-            self._P_pred,
+            Innovations(nu=self.innovation[None], S=self.innovation_covariance[None]),
         )
+        self._predict = library.live_predict.bind(self._times, self._count, problem.given_bundle, Q, base, self._predicted)
         self._update = library.live_update.bind(
             self._times,
-            self._which,
-            self._row,
-            problem.station_sensor,
-            problem.station_numbers,
-            problem.station_noise,
-            problem.station_correlated,
-            problem.given,
-            self._x_pred,
-            self._P_pred,
-            self._d,
-            self._P,
-            self.mean,
-            self.covariance,
-            self.innovation,
-            self.innovation_covariance,
+            problem.given_bundle,
+            measured_by(problem, self._row, self._which),
+            self._predicted,
+            correction,
+            self._now,
+            innovations,
             self.widest,
         )
 
@@ -201,7 +192,7 @@ class LiveFilter(Session):
         ValueError
             For an unknown station, a wrong number of components, an infinite value, or a time that has passed.
         """
-        s = checked_measurement(self.problem, self._stations, station, z, self._row)
+        s = checked_measurement(self.problem, self._stations, station, z, self._row[0])
         if t is not None:
             self.predict(t)
         elif self._predicted_to is None:

@@ -8,12 +8,29 @@ from typing import Any, ClassVar
 import numpy as np
 
 from piazzi.estimate.live import Clock, checked_measurement, clock_times
-from piazzi.estimate.root import Root
+from piazzi.estimate.root import Results, Root, RootKernel
 from piazzi.estimate.saved import Saved
 from piazzi.estimate.session import Session
+from piazzi.kernels.bundle import Run
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
-from piazzi.problem.inputs import Inputs
+from piazzi.problem.inputs import measured_by
+
+
+class _Epoch:
+    """An epoch of so many rows, whose arrays are written in place and whose results are read before the next one."""
+
+    def __init__(self, kernel: RootKernel, rows: int) -> None:
+        problem = kernel.problem
+        self.t, self.count, self.scale = np.empty(1), np.empty(1, dtype=np.int64), np.empty(1)
+        self._first_row, self._Q = np.array([0, rows]), problem.process_noise.covariance
+        self.measured = measured_by(problem, np.empty((rows, problem.model.width)), np.empty(rows, dtype=np.int64))
+        self.results = kernel.results(1, rows)
+
+    def run(self, before: float) -> Run:
+        """The run over this epoch from a belief at the time `before`."""
+        times = {"t_prior": before, "t": self.t, "count": self.count, "scale": self.scale}
+        return Run(epochs=1, first_row=self._first_row, Q=self._Q, **times)
 
 
 class LiveRootFilter(Session):
@@ -48,7 +65,7 @@ class LiveRootFilter(Session):
         self.base_mean, self.root = problem.mean.copy(), self._kernel.prior_root()
         self.base_root = self.root.copy()
         self._row, self._values, self._rows_of = np.full(m, np.nan), np.empty((0, m)), np.empty(0, dtype=np.int64)
-        self.time = problem.prior_time
+        self.time, self._epochs = problem.prior_time, dict[int, _Epoch]()
 
     def predict(self, t: float) -> None:
         """Carry the belief to time `t`, from the last epoch that had a measurement; raises ValueError where `t` is earlier."""
@@ -82,23 +99,27 @@ class LiveRootFilter(Session):
             raise ValueError(
                 "the time of the first measurement is not known: call predict(t) first, or give the problem a prior_time"
             )
-        self._values, self._rows_of = np.vstack([self._values, self._row]), np.append(self._rows_of, np.int64(s))
-        nu, S, rejected = self._run()
-        self.innovation, self.innovation_covariance, self.rejected = nu[-1], S[-1], bool(rejected[-1])
+        self._values = np.concatenate([self._values, self._row[None]])
+        self._rows_of = np.concatenate([self._rows_of, [s]])
+        gate, _, innovations = self._run()
+        self.innovation, self.innovation_covariance = innovations.nu[-1].copy(), innovations.S[-1].copy()
+        self.rejected = bool(gate.rejected[-1])
 
-    def _run(self) -> tuple[Array, Array, Array]:
+    def _run(self) -> Results:
         """The epoch at `time`, with the rows that it has so far, from the belief before it."""
         assert self.time is not None
-        t = self.time
-        dt = self._clock.interval(t)
-        count, scale = self._clock.step(dt) if dt > 0 else (1, 0.0)
-        before = t if self._clock.time is None else self._clock.time
-        one = np.array([t]), before, np.array([count], dtype=np.int64), np.array([scale])
-        inputs = Inputs(*one, np.array([0, len(self._values)], dtype=np.int64), self._values, self._rows_of)
-        root = self.base_root.copy()
-        mean, P, nu, S, rejected = self._kernel.run(inputs, self.base_mean, root)
-        self.mean, self.covariance, self.root = mean[0], P[0], root
-        return nu, S, rejected
+        t, rows = self.time, len(self._values)
+        if rows not in self._epochs:
+            self._epochs[rows] = _Epoch(self._kernel, rows)
+        epoch, dt = self._epochs[rows], self._clock.interval(t)
+        epoch.t[0] = t
+        epoch.count[0], epoch.scale[0] = self._clock.step(dt) if dt > 0 else (1, 0.0)
+        epoch.measured.z[:], epoch.measured.station[:] = self._values, self._rows_of
+        run = epoch.run(t if self._clock.time is None else self._clock.time)
+        self.root = self._kernel.run(run, epoch.measured, self.base_mean, self.base_root, epoch.results).copy()
+        beliefs = epoch.results[1]
+        self.mean, self.covariance = beliefs.mean[0].copy(), beliefs.covariance[0].copy()
+        return epoch.results
 
     # ---- what it stands on ---------------------------------------------------------------------------------------
 

@@ -11,14 +11,16 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.live import Clock, checked_measurement
 from piazzi.estimate.losses import Loss
-from piazzi.estimate.robust_window import row_space, window_fragments
+from piazzi.estimate.robust_window import loss_numbers, window_fragments
 from piazzi.estimate.saved import MOST_STEPS, Saved, check_order, check_steps
 from piazzi.estimate.session import Session
 from piazzi.estimate.stretch import Stretch
 from piazzi.estimate.width import told
+from piazzi.kernels.bundle import Belief, Chain, Innovations, Interval, Run, Window
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import measured_by
 
 
 def window_opens(newest: Any, lag_seconds: float) -> Any:
@@ -111,7 +113,8 @@ class LiveWindow(Session):
         """Predict a belief in place."""
         p, (count, scale) = self.problem, self._clock.step(dt)
         Q = p.process_noise.covariance
-        self._library.predict_once(now, dt, count, scale, p.given, Q, mean, covariance, *self._unread)
+        interval, belief = Interval(t=now, dt=dt, count=count, scale=scale), Belief(mean=mean, covariance=covariance)
+        self._library.predict_once(interval, p.given_bundle, Q, belief, *self._unread)
 
     def update(self, station: str, z: Any, t: float | None = None) -> bool:
         """Take in a measurement, at `t` or where the last prediction stands; whether it was inside the window.
@@ -139,7 +142,7 @@ class LiveWindow(Session):
             self._insert(t)
         k = window.find(t)
         window.add_row(k, self._row, s)
-        self._settle(late=k < window.stop - 1)
+        self._solve_newest(late=k < window.stop - 1)
         if k < window.stop - 1:
             self._note_width(k)
         return True
@@ -160,7 +163,7 @@ class LiveWindow(Session):
         stays = self._stays()
         if stays > window.first:
             self._span[:] = window.first, stays
-            self._retire()
+            self._marginalize()
             window.first = stays
         window.x_before[stays : window.stop] = window.x[stays : window.stop]
 
@@ -191,7 +194,7 @@ class LiveWindow(Session):
 
     # ---- the window ----------------------------------------------------------------------------------------------
 
-    def _settle(self, late: bool) -> None:
+    def _solve_newest(self, late: bool) -> None:
         """Gauss-Newton steps over the window, and what came of them; innovations belong to the newest epoch."""
         self._rebind()
         window = self._window
@@ -209,8 +212,8 @@ class LiveWindow(Session):
     def _note_width(self, k: int) -> None:
         """Keep the largest predicted variance, in units of its noise, of rows of an older epoch: they have no innovations."""
         window, (nu, H, _) = self._window, self._linear
-        first, m = window.first_row[window.first], self.problem.model.width
-        rows = slice((window.first_row[k] - first) * m, (window.first_row[k + 1] - first) * m)
+        first = window.first_row[window.first]
+        rows = slice(window.first_row[k] - first, window.first_row[k + 1] - first)
         seen = H[rows][~np.isnan(nu[rows])]
         self.widest[0] = np.max(np.sum(seen @ self._P_pred[k - window.first] * seen, axis=1), initial=self.widest[0])
 
@@ -225,47 +228,49 @@ class LiveWindow(Session):
         """Work space for all that the window's buffers hold, and the kernels on both."""
         p, w, n, m = self.problem, self._window, self.problem.model.n, self.problem.model.width
         self._room = E, R = w.room
-        given, Q, noisy = p.given, p.process_noise.covariance, E if p.noise_varies else 1
-        self._linear = nu, H, dx = np.zeros(R * m), np.zeros((R * m, n)), np.zeros((E, n))
+        noisy = E if p.noise_varies else 1
+        self._linear = nu, H, dx = np.zeros((R, m)), np.zeros((R, m, n)), np.zeros((E, n))
         self._nu, self._S, self._P_pred = np.zeros((R, m)), np.zeros((R, m, m)), np.zeros((E, n, n))
         self._oldest_covariance, self._newest_covariance = np.zeros((E, n, n)), np.zeros((n, n))
-        epochs = w.t, w.count, w.scale, w.first_row
-        self._predict_once: Callable[[], None] = self._library.live_append.bind(self._span, w.t, w.count, given, w.x)
-        self._retire: Callable[[], None] = self._library.live_retire.bind(
-            self._span, *epochs, given, Q, self._m, self._P, w.x, nu, H, dx
+        run = Run(
+            epochs=E,
+            t_prior=0.0,
+            t=w.t,
+            count=w.count,
+            scale=w.scale,
+            first_row=w.first_row,
+            Q=p.process_noise.covariance,
         )
-        self._solve: Callable[[], None] = self._library.live_settle.bind(
-            self._span,
-            self.iterations,
-            *epochs,
-            w.z,
-            w.station,
-            p.station_sensor,
-            p.station_numbers,
-            p.station_noise,
-            p.station_correlated,
-            given,
-            Q,
-            self._m,
-            self._P,
-            np.zeros((E, n)),
-            np.zeros((E, n, n)),
-            np.zeros((noisy, n, n)),
-            nu,
-            H,
-            np.zeros((E, n)),
-            self._P_pred,
-            np.zeros((R * m + n, n + 1)),
-            np.zeros((E, n)),
-            dx,
-            row_space(p, self._loss, R),
-            np.zeros((n, n)),
-            w.x,
-            self._oldest_covariance,
-            self._newest_covariance,
-            self._nu,
-            self._S,
-            self.widest,
+        window = Window(
+            iterations=self.iterations,
+            m=self._m,
+            P=self._P,
+            delayed=self._oldest_covariance,
+            newest=self._newest_covariance,
+        )
+        chain = Chain(
+            x=w.x,
+            f=np.zeros((E, n)),
+            Phi=np.zeros((E, n, n)),
+            Q_all=np.zeros((noisy, n, n)),
+            nu=nu,
+            H=H,
+            d_pred=np.zeros((E, n)),
+            P_pred=self._P_pred,
+            gains=np.zeros((R * m + n, n + 1)),
+            multiplier=np.zeros((E, n)),
+            dx=dx,
+            scaling=np.zeros((n, n)),
+            loss=loss_numbers(p, self._loss),
+            weights=np.ones(R),
+        )
+        library, span, given = self._library, self._span, p.given_bundle
+        innovations = Innovations(nu=self._nu, S=self._S)
+        measured = measured_by(p, w.z, w.station)
+        self._predict_once: Callable[[], None] = library.live_append.bind(span, run, given, chain)
+        self._marginalize: Callable[[], None] = library.live_marginalize.bind(span, window, run, given, chain)
+        self._solve: Callable[[], None] = library.live_solve.bind(
+            span, window, run, given, measured, chain, innovations, self.widest
         )
 
     # ---- checkpoints ---------------------------------------------------------------------------------------------
@@ -288,8 +293,8 @@ class LiveWindow(Session):
         W, J, m = len(window), window.rows, self.problem.model.width
         if W:
             nu, H, dx = self._linear
-            H = np.where(np.isnan(nu[: J * m])[:, None], 0.0, H[: J * m])  # what is missing has none
-            out |= {"nu_lin": nu[: J * m].copy(), "H_lin": H, "dx": dx[:W].copy()}
+            H = np.where(np.isnan(nu[:J])[:, :, None], 0.0, H[:J])  # what is missing has none
+            out |= {"nu_lin": nu[:J].flatten(), "H_lin": H.reshape(J * m, -1), "dx": dx[:W].copy()}
             out["oldest_covariance"] = self._oldest_covariance[window.first].copy()
         mean, covariance = self._newest
         return out | {
@@ -346,7 +351,7 @@ class LiveWindow(Session):
         self._bind()
         if len(self._window):
             for values, name in zip(self._linear, ("nu_lin", "H_lin", "dx"), strict=True):
-                values[: len(kept[name])] = kept[name]
+                values.reshape(-1)[: kept[name].size] = kept[name].reshape(-1)
             self._oldest_covariance[0] = kept["oldest_covariance"]
         self._pending = None
         if not isnan(kept["pending"][0]):

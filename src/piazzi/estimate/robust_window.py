@@ -19,13 +19,6 @@ def window_fragments(problem: Problem, loss: Loss | None, *last: str) -> tuple[s
     return (*rest, "epoch_guarded", "linearize_robust", "window_prior", "window_step_robust", *last)
 
 
-def row_space(problem: Problem, loss: Loss | None, rows: int) -> Array:
-    """Work space of linearised rows; with a loss, its numbers and the weights of so many rows behind it."""
-    M, N = problem.model.width, problem.model.n
-    factors = np.empty(M * (M + N))
-    return factors if loss is None else np.concatenate([factors, [loss.kind], loss.squares(M), np.ones(rows)])
-
-
-def row_weights(space: Array, rows: int) -> Array:
-    """The weights of so many rows in that work space, (rows,)."""
-    return space[len(space) - rows :].copy()
+def loss_numbers(problem: Problem, loss: Loss | None) -> Array:
+    """A loss as kernels take it: its kind, and the squares of its constant for rows of 0 ... M components."""
+    return np.zeros(1) if loss is None else np.array([loss.kind, *loss.squares(problem.model.width)], dtype=float)

@@ -14,12 +14,14 @@ from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.guarded import Guard
 from piazzi.estimate.kalman import check_start
 from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.kernels.bundle import Beliefs, Gate, Innovations, JointRoot, Measured, RootForm, Run
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
-from piazzi.problem.inputs import Inputs, prepare
+from piazzi.problem.inputs import prepare
 
 MOST_LANES = 16
+Results = tuple[Gate, Beliefs, Innovations]
 
 
 @dataclass(frozen=True)
@@ -30,14 +32,15 @@ class Root:
     ----------
     fragment : "root_linear", by Jacobians, or "root_unscented", by sigma points
     unknowns : unit variances that an epoch's measurements depend on, in multiples of n
-    settings : numbers that the fragment reads
+    eta, share : spread of sigma points, and the share of the sum of their even parts that each gets; zero without points
     gate : probability that a good row passes, None where every row is taken
     """
 
     fragment: str
     unknowns: int
-    settings: tuple[float, ...]
     gate: float | None
+    eta: float = 0.0
+    share: float = 0.0
 
     def kernel(self, problem: Problem) -> RootKernel:
         """The compiled filter of a problem."""
@@ -61,50 +64,40 @@ class RootKernel:
             "filter_root",
         )
         self._library = kernels.load(problem.spec(*parts, lanes=machine_lanes() if together else 1))
-        self._numbers = (np.array(root.settings or (0.0,)), Guard(1, root.gate).thresholds(m))
+        self._limits = Guard(1, root.gate).thresholds(m)
         A = root.unknowns * n
-        # sigma points, rows to be triangularised, sensitivities, joint root, correction, and scratch
-        shapes = ((2 * n + MOST_LANES) * n, (A + n) * n, m * A, A * A, A, A, 2 * m)
-        self._space = (*self._numbers, *(np.empty(size) for size in shapes))
+        self._root = RootForm(
+            mean=np.empty(n),
+            U=np.empty((n, n)),
+            eta=root.eta,
+            share=root.share,
+            points=np.empty((2 * n + MOST_LANES, n)),
+            rows=np.empty((A + n, n)),
+        )
+        self._joint = JointRoot.empty(A=A, M=m)
 
     def prior_root(self) -> Array:
         """Root of the prior covariance, (n, n)."""
-        U = np.empty((self.problem.model.n, self.problem.model.n))
-        self._library.make_root(self.problem.covariance, U)
-        return U
+        self._library.begin_root(self.problem.prior_bundle, self._root)
+        return self._root.U.copy()  # type: ignore[no-any-return]
 
-    def run(self, inputs: Inputs, start: Array, U: Array) -> tuple[Array, ...]:
-        """Means (K, n), covariances (K, n, n), innovations (J, m) with theirs (J, m, m), and 1 for each row rejected, (J,).
+    def results(self, epochs: int, rows: int) -> Results:
+        """Room for what a run over so many epochs and rows gives."""
+        n, m = self.problem.model.n, self.problem.model.width
+        gate = Gate(iterations=1, limits=self._limits, rejected=np.empty(rows, dtype=np.int64))
+        return gate, Beliefs.empty(K=epochs, N=n), Innovations.empty(J=rows, M=m)
 
-        Begins at the mean `start` with the root `U`, which is replaced by the last one.
-        """
-        K, n, (J, m) = inputs.epochs, self.problem.model.n, inputs.z.shape
-        mean, P = np.empty((K, n)), np.empty((K, n, n))
-        nu, S, rejected = np.empty((J, m)), np.empty((J, m, m)), np.zeros(J, dtype=np.int64)
-        self._library.run_root_filter(
-            K,
-            inputs.t,
-            inputs.t_prior,
-            inputs.count,
-            inputs.scale,
-            *inputs.measured(self.problem),
-            self.problem.given,
-            self.problem.process_noise.covariance,
-            start,
-            U,
-            *self._space,
-            rejected,
-            mean,
-            P,
-            nu,
-            S,
-        )
-        return mean, P, nu, S, rejected
+    def run(self, run: Run, measured: Measured, start: Array, U: Array, results: Results) -> Array:
+        """Write the results of a run from the mean `start` with the root `U`; the last root, whose array is reused."""
+        root = self._root
+        root.mean[:], root.U[:] = start, U
+        self._library.run_root_filter(run, self.problem.given_bundle, measured, root, self._joint, *results)
+        return root.U  # type: ignore[no-any-return]
 
 
 def linear_root(gate: float | None = None) -> Root:
     """The extended Kalman filter in square-root form."""
-    return Root("root_linear", 1, (), gate)
+    return Root("root_linear", 1, gate)
 
 
 def root_estimate(
@@ -115,14 +108,17 @@ def root_estimate(
     Raises ValueError where the tracking does not fit the problem.
     """
     inputs = prepare(problem, tracking)
+    run, _, measured, _ = inputs.bundles(problem)
     kernel = root.kernel(problem)
     watch = Stopwatch()
-    mean, P, nu, S, rejected = kernel.run(inputs, problem.mean, kernel.prior_root())
+    gate, beliefs, innovations = kernel.results(inputs.epochs, len(inputs.z))
+    kernel.run(run, measured, problem.mean, kernel.prior_root(), (gate, beliefs, innovations))
     seconds = watch.seconds()
+    (mean, P), (nu, S) = beliefs.members, innovations.members
     check_start(problem, inputs, mean[0])
     details: dict[str, Any] = dict(about)
     if root.gate is not None:
-        out = rejected.astype(bool)
+        out = gate.rejected.astype(bool)
         out.setflags(write=False)
         details |= {"rejected": out, "rejected_count": int(out.sum())}
     return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs, seconds, details=details)

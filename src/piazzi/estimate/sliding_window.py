@@ -14,9 +14,10 @@ from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate, View
 from piazzi.estimate.live_window import LiveWindow, window_opens
 from piazzi.estimate.losses import loss_of
-from piazzi.estimate.robust_window import row_space, row_weights, window_fragments
+from piazzi.estimate.robust_window import loss_numbers, window_fragments
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.estimate.width import RESTLESS, TOO_WIDE, last_wide, too_wide
+from piazzi.kernels.bundle import Beliefs, Chain, Innovations, Window
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
@@ -107,47 +108,39 @@ class SlidingWindow:
         """
         inputs = prepare(problem, tracking)
         begin = self.first_states(inputs.t)
-        work = row_space(problem, self.loss, len(inputs.z))
+        weights = np.ones(len(inputs.z))
         watch = Stopwatch()
-        run, failure, solver = self._run(problem, inputs, begin, work, problem.mean, problem.covariance), "", "chain"
+        run, failure, solver = self._run(problem, inputs, begin, weights, problem.mean, problem.covariance), "", "chain"
         if too_wide(problem, inputs, run.S):
             run, failure, solver = self._wide(problem, tracking, inputs, begin, run)
         seconds = watch.seconds()
         lag = self.lag if self.lag_seconds is None else None
         details: dict[str, Any] = {"lag": lag, "lag_seconds": self.lag_seconds, "solver": solver}
         if self.loss is not None:
-            details |= {"loss": str(self.loss), "weights": row_weights(work, len(inputs.z))}
+            details |= {"loss": str(self.loss), "weights": weights}
         steps = inputs.epochs * self.iterations
         told = failure or undetermined(problem, run.P_delayed[0], run.x, run.P[-1])
         late = Estimate(problem, tracking, run.x, run.P_delayed, run.nu, run.S, steps, seconds, "delayed", None, details, told)
         return Estimate(problem, tracking, run.mean, run.P, run.nu, run.S, steps, seconds, "realtime", late, details, failure)
 
     def _run(
-        self, problem: Problem, inputs: Inputs, begin: Array, work: Array, prior_mean: Array, prior_covariance: Array
+        self, problem: Problem, inputs: Inputs, begin: Array, weights: Array, prior_mean: Array, prior_covariance: Array
     ) -> WindowRun:
         """The window over these epochs, begun at a prior."""
         library = kernels.load(problem.spec(*window_fragments(problem, self.loss, "window"), lanes=lanes_for(problem.model.n)))
         K, N, (J, M) = inputs.epochs, problem.model.n, inputs.z.shape
-        run = WindowRun(
-            *(np.empty(shape) for shape in ((K, N), (K, N, N), (K, N), (K, N, N), (J, M), (J, M, M))),
+        chain = window_chain(problem, inputs, begin, loss_numbers(problem, self.loss), weights)
+        window = Window(
+            iterations=self.iterations,
+            m=prior_mean.copy(),
+            P=prior_covariance.copy(),
+            delayed=np.empty((K, N, N)),
+            newest=np.empty((N, N)),
         )
-        library.run_window(
-            K,
-            begin,
-            self.iterations,
-            inputs.t,
-            inputs.t_prior,
-            inputs.count,
-            inputs.scale,
-            *inputs.measured(problem),
-            problem.given,
-            problem.process_noise.covariance,
-            prior_mean,
-            prior_covariance,
-            *window_space(problem, inputs, begin, work),
-            *run,
-        )
-        return run
+        run, p, measured, _ = inputs.bundles(problem)
+        beliefs, innovations = Beliefs.empty(K=K, N=N), Innovations.empty(J=J, M=M)
+        library.run_window(begin, window, run, p, measured, chain, beliefs, innovations)
+        return WindowRun(chain.x, window.delayed, *beliefs.members, *innovations.members)
 
     def _wide(
         self, problem: Problem, tracking: Tracking, inputs: Inputs, begin: Array, run: WindowRun
@@ -175,7 +168,7 @@ class SlidingWindow:
                 problem,
                 rest,
                 np.maximum(begin[own:] - own, 0),
-                row_space(problem, None, len(rest.z)),
+                np.ones(len(rest.z)),
                 np.array(forward.mean[open_until]),
                 np.array(forward.covariance[open_until]),
             )
@@ -193,25 +186,25 @@ class SlidingWindow:
         return LiveWindow(problem, self.lag, self.lag_seconds, self.iterations, self.loss)
 
 
-def window_space(problem: Problem, inputs: Inputs, begin: Array, work: Array) -> tuple[Array, ...]:
-    """Buffers of the largest window, in the order of the kernel; `work` is the one for linearised rows."""
+def window_chain(problem: Problem, inputs: Inputs, begin: Array, loss: Array, weights: Array) -> Chain:
+    """All states, and buffers of the largest window; `loss` and `weights` of rows as `Chain` has them."""
     N, M = problem.model.n, problem.model.width
     newest = np.arange(len(begin))
     W = int((newest - begin).max()) + 1
-    rows = int((inputs.first_row[newest + 1] - inputs.first_row[begin]).max()) * M
-    in_epoch = inputs.most_rows * M
-    Q_all = np.empty((W if problem.noise_varies else 1, N, N))
-    return (
-        np.empty((W, N)),
-        np.empty((W, N, N)),
-        Q_all,
-        np.empty(rows),
-        np.empty((rows, N)),
-        np.empty((W, N)),
-        np.empty((W, N, N)),
-        np.empty((in_epoch + N, N + 1)),
-        np.empty((W, N)),
-        np.empty((W, N)),
-        work,
-        np.empty((N, N)),
+    rows = int((inputs.first_row[newest + 1] - inputs.first_row[begin]).max())
+    return Chain(
+        x=np.empty((len(begin), N)),
+        f=np.empty((W, N)),
+        Phi=np.empty((W, N, N)),
+        Q_all=np.empty((W if problem.noise_varies else 1, N, N)),
+        nu=np.empty((rows, M)),
+        H=np.empty((rows, M, N)),
+        d_pred=np.empty((W, N)),
+        P_pred=np.empty((W, N, N)),
+        gains=np.empty((inputs.most_rows * M + N, N + 1)),
+        multiplier=np.empty((W, N)),
+        dx=np.empty((W, N)),
+        scaling=np.empty((N, N)),
+        loss=loss,
+        weights=weights,
     )

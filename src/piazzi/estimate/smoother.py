@@ -16,6 +16,7 @@ from piazzi.estimate.estimator import Estimate, View
 from piazzi.estimate.kalman import check_start
 from piazzi.estimate.stopwatch import Stopwatch
 from piazzi.estimate.width import RESTLESS, TOO_WIDE, too_wide
+from piazzi.kernels.bundle import Chain, Innovations, Smoothed
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.inputs import prepare
@@ -53,36 +54,15 @@ class Smoother:
         inputs = prepare(problem, tracking)
         library = kernels.load(problem.spec(*chain_fragments(problem, "smoother"), lanes=lanes_for(problem.model.n)))
         K, n, (J, m) = inputs.epochs, problem.model.n, inputs.z.shape
-        mean, covariance, cross = np.empty((K, n)), np.empty((K, n, n)), np.empty((max(K - 1, 1), n, n))
-        nu, S = np.empty((J, m)), np.empty((J, m, m))
-        most = inputs.most_rows * m
-        watch = Stopwatch()
-        library.run_smoother(
-            K,
-            inputs.t,
-            inputs.t_prior,
-            inputs.count,
-            inputs.scale,
-            *inputs.measured(problem),
-            problem.given,
-            problem.process_noise.covariance,
-            problem.mean,
-            problem.covariance,
-            np.empty((K, n, n)),
-            np.empty((K if problem.noise_varies else 1, n, n)),
-            np.empty((J, m)),
-            np.empty((J, m, n)),
-            np.empty((K, n)),
-            np.empty((K, n, n)),
-            np.empty((most, n + 1)),
-            np.empty((n, n)),
-            int(self.cross_covariances),
-            mean,
-            covariance,
-            cross,
-            nu,
-            S,
+        cross = np.empty((max(K - 1, 1), n, n))
+        smoothed = Smoothed(
+            mean=np.empty((K, n)), covariance=np.empty((K, n, n)), keep_cross=int(self.cross_covariances), cross=cross
         )
+        innovations = Innovations.empty(J=J, M=m)
+        chain = Chain.empty(X=K, C=K, N=n, L=K if problem.noise_varies else 1, B=J, M=m, A=inputs.most_rows * m)
+        watch = Stopwatch()
+        library.run_smoother(*inputs.bundles(problem), chain, smoothed, innovations)
+        (mean, covariance, *_), (nu, S) = smoothed.members, innovations.members
         seconds = watch.seconds()
         first = slice(inputs.first_row[1])
         seen = ~np.isnan(inputs.z[first])

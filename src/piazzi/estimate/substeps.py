@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.kalman import update_fragments
+from piazzi.kernels.bundle import Beliefs
 from piazzi.problem import Problem, ProcessNoise, Tracking, Truth
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import prepare
@@ -73,25 +74,13 @@ def substep_error(problem: Problem, tracking: Any) -> StepError:
     seen = tracking if isinstance(tracking, Tracking) else _undisturbed(problem, tracking)
     inputs = prepare(problem, seen)
     K, n = inputs.epochs, problem.model.n
-    bias, P = np.zeros((K, n)), np.empty((K, n, n))
     if problem.integrator.chooses_steps:
-        return StepError(inputs.t, bias, np.ones((K, n)), problem.model.names)
+        return StepError(inputs.t, np.zeros((K, n)), np.ones((K, n)), problem.model.names)
     parts = ("transition", problem.noise_fragment, *update_fragments(problem, "auto"), "step_error")
-    kernels.load(problem.spec(*parts)).run_step_error(
-        K,
-        inputs.t,
-        inputs.t_prior,
-        inputs.count,
-        FINER * inputs.count,
-        inputs.scale,
-        *inputs.measured(problem),
-        problem.given,
-        problem.process_noise.covariance,
-        problem.mean,
-        problem.covariance,
-        bias,
-        P,
-    )
+    run, *rest = inputs.bundles(problem)
+    beliefs = Beliefs.empty(K=K, N=n)
+    kernels.load(problem.spec(*parts)).run_step_error(run, FINER * inputs.count, *rest, beliefs)
+    bias, P = beliefs.members
     with np.errstate(invalid="ignore"):
         sigma = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
     return StepError(inputs.t, bias, sigma, problem.model.names)

@@ -82,4 +82,4 @@ class UnscentedKalmanFilter:
                 f"alpha {self.alpha:g}, beta {self.beta:g} and kappa {self.kappa:g} allow indefinite covariances with "
                 f"{n} values: beta must be at least {-(self.alpha**2) * self.kappa / n:g}"
             )
-        return Root("root_unscented", 2, (eta, (sqrt(total) - 1.0) / n), self.gate)
+        return Root("root_unscented", 2, self.gate, eta, (sqrt(total) - 1.0) / n)

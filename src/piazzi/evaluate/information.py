@@ -10,6 +10,7 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.evaluate.quantities import finite
+from piazzi.kernels.bundle import Noiseless, Observation
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs
@@ -91,19 +92,10 @@ def coast(problem: Problem, inputs: Inputs, first: Array) -> Array:
 
 def predicted(problem: Problem, inputs: Inputs, states: Array) -> Array:
     """Noiseless measurements (J, m) of states (K, n), NaN where a sensor has fewer components."""
-    z = np.empty_like(inputs.z)
-    _library(problem).predict_rows(
-        inputs.epochs,
-        inputs.t,
-        inputs.first_row,
-        inputs.station,
-        problem.station_sensor,
-        problem.station_numbers,
-        problem.given,
-        np.ascontiguousarray(states),
-        z,
-    )
-    return z
+    run, p, measured, _ = inputs.bundles(problem)
+    noiseless = Noiseless(states=np.ascontiguousarray(states), z=np.empty_like(inputs.z))
+    _library(problem).predict_rows(run, p, measured, noiseless)
+    return noiseless.z  # type: ignore[no-any-return]
 
 
 def _library(problem: Problem) -> SimpleNamespace:
@@ -112,21 +104,10 @@ def _library(problem: Problem) -> SimpleNamespace:
 
 def _observe(problem: Problem, inputs: Inputs, states: Array, *, follow: bool) -> Shot:
     N, (J, M) = problem.model.n, inputs.z.shape
-    innovations, rows = np.empty((J, M)), np.empty((J * M, N))
-    _library(problem).observe(
-        inputs.epochs,
-        inputs.t,
-        inputs.count,
-        inputs.scale,
-        *inputs.measured(problem),
-        problem.given,
-        problem.process_noise.covariance,
-        int(follow),
-        states,
-        innovations,
-        rows,
-    )
-    return Shot(innovations, rows, states)
+    run, p, measured, _ = inputs.bundles(problem)
+    seen = Observation(states=states, innovations=np.empty((J, M)), rows=np.empty((J, M, N)))
+    _library(problem).observe(run, p, measured, int(follow), seen)
+    return Shot(seen.innovations, seen.rows.reshape(J * M, N), states)
 
 
 def factor(rows: Array, above: Array | None = None) -> Array:

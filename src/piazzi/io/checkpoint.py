@@ -22,7 +22,8 @@ _MOST = 2**62
 
 def fingerprint(problem: Problem, estimator: object) -> Array:
     """Digest of a problem and an estimator's settings as numbers: a checkpoint fits only what it was made with."""
-    arrays = (problem.mean, problem.covariance, problem.process_noise.covariance, problem.given, problem.station_noise)
+    given = np.append(problem.given, problem.given_bundle.manoeuvres) if problem.manoeuvres else problem.given
+    arrays = (problem.mean, problem.covariance, problem.process_noise.covariance, given, problem.station_noise)
     numbers = b"".join(np.ascontiguousarray(a).tobytes() for a in (*arrays, problem.station_numbers))
     noise = problem.process_noise
     kind = (noise.per, noise.method, noise.axes)

@@ -2,7 +2,6 @@
 
 from piazzi.kernels.cache import build_seconds, is_compiled, load
 from piazzi.kernels.integrators import ConstantAcceleration, Discrete, DormandPrince, Integrator, Kepler, Taylor
-from piazzi.kernels.library import Ready, ready
 from piazzi.kernels.runge_kutta import (
     DormandPrince5,
     Euler,
@@ -14,7 +13,7 @@ from piazzi.kernels.runge_kutta import (
     RungeKutta4,
     RungeKutta8,
 )
-from piazzi.kernels.spec import KernelSpec
+from piazzi.kernels.spec import KernelSpec, fragment
 
 __all__ = [
     "ConstantAcceleration",
@@ -29,13 +28,12 @@ __all__ = [
     "KernelSpec",
     "Midpoint",
     "Ralston",
-    "Ready",
     "RungeKutta",
     "RungeKutta4",
     "RungeKutta8",
     "Taylor",
     "build_seconds",
+    "fragment",
     "is_compiled",
     "load",
-    "ready",
 ]

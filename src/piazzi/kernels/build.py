@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from importlib.abc import InspectLoader
 from importlib.util import module_from_spec, spec_from_loader
 from types import ModuleType
-from typing import Any
 
-from piazzi.kernels.library import INTEGER, POINTER, REAL, Entry, PlainEntry
+from piazzi.kernels.entries import signatures
+from piazzi.kernels.library import Entry, PlainEntry
 from piazzi.kernels.settings import own_settings
 
 UNKNOWN_INSIDE = (ImportError, AttributeError, TypeError)
@@ -34,14 +35,14 @@ def module_of(source: str) -> ModuleType:
     return module
 
 
-def plain_entries(source: str, names: tuple[str, ...]) -> dict[str, PlainEntry]:
+def plain_entries(source: str, sizes: Mapping[str, int]) -> dict[str, PlainEntry]:
     """The entries of a module generated for the plain vocabulary."""
     module = module_of(source)
-    return {name: PlainEntry(getattr(module, name)) for name in names}
+    return {name: PlainEntry(name, getattr(module, name), takes, sizes) for name, takes in signatures(source).items()}
 
 
-def compile_entries(source: str, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
-    """Object code of each entry, and its symbol with the kinds of its arguments.
+def compile_entries(source: str) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
+    """Object code of each entry, and its symbol with what it takes.
 
     Raises
     ------
@@ -49,7 +50,7 @@ def compile_entries(source: str, names: tuple[str, ...]) -> tuple[dict[str, byte
         Among others, where parts of Numba are no longer what they were: `live_entries` may serve.
     """
     try:
-        return _compiled(source, names)
+        return _compiled(source)
     except UNKNOWN_INSIDE:
         raise
     except Exception as error:
@@ -67,37 +68,23 @@ def tell_of_source(source: str, error: Exception) -> None:
     error.add_note(f"the source of the kernel that could not be compiled is kept in {copy.name}")
 
 
-def _compiled(source: str, names: tuple[str, ...]) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
+def _compiled(source: str) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     with own_settings():
         from piazzi.kernels.compiler import object_code
 
         module = module_of(source)
-        callbacks = {name: getattr(module, name) for name in names}
-        objects = {name: object_code(callback) for name, callback in callbacks.items()}
-        symbols = {name: (callback.native_name, _kinds(callback)) for name, callback in callbacks.items()}
+        callbacks = {name: (getattr(module, name), takes) for name, takes in signatures(source).items()}
+        objects = {name: object_code(callback) for name, (callback, _) in callbacks.items()}
+        symbols = {name: (callback.native_name, takes) for name, (callback, takes) in callbacks.items()}
     return objects, symbols
 
 
-def live_entries(source: str, names: tuple[str, ...]) -> dict[str, Entry]:
+def live_entries(source: str, sizes: Mapping[str, int]) -> dict[str, Entry]:
     """The entries as Numba itself loads them, by its public functions alone: there is no object code to keep."""
     with own_settings():
         from piazzi.kernels.compiler import public_way
 
         with public_way():
             module = module_of(source)
-        callbacks = {name: getattr(module, name) for name in names}
-        return {name: Entry(callback.address, _kinds(callback), callback) for name, callback in callbacks.items()}
-
-
-def _kinds(callback: Any) -> tuple[str, ...]:
-    """Of an entry's arguments, by its annotations."""
-    given = callback.__wrapped__.__annotations__.items()
-    return tuple({int: INTEGER, float: REAL}.get(kind, POINTER) for name, kind in given if name != "return")
-
-
-def entry_names(source: str) -> tuple[str, ...]:
-    """Names of the functions marked `entry`."""
-    import ast
-
-    found = [n for n in ast.parse(source).body if isinstance(n, ast.FunctionDef)]
-    return tuple(n.name for n in found if any(isinstance(d, ast.Name) and d.id == "entry" for d in n.decorator_list))
+        callbacks = {name: (getattr(module, name), takes) for name, takes in signatures(source).items()}
+        return {name: Entry(name, c.address, takes, sizes, c) for name, (c, takes) in callbacks.items()}

@@ -10,11 +10,12 @@ import os
 import threading
 import time
 import warnings
+from collections.abc import Mapping
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
-from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, entry_names, live_entries, plain_entries, tell_of_source
+from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, live_entries, plain_entries, tell_of_source
 from piazzi.kernels.folder import Folder, private_folder, writable_folder
 from piazzi.kernels.library import load_objects
 from piazzi.kernels.settings import may_be_kept
@@ -73,12 +74,12 @@ def build_seconds() -> float:
 
 def _plain(spec: KernelSpec) -> SimpleNamespace:
     source = spec.source("plain")
-    return SimpleNamespace(**plain_entries(source, entry_names(source)))
+    return SimpleNamespace(**plain_entries(source, spec.sizes))
 
 
 def _from_disk_or_built(spec: KernelSpec) -> SimpleNamespace:
     digest, (place, _) = spec.digest(), private_folder()
-    entries = _read(place, digest) if place else None
+    entries = _read(place, digest, spec.sizes) if place else None
     if entries is None:
         home = writable_folder()
         LOGGER.info("compiling %s for %s, once (about 3 to 15 s) ...", spec.fragments[-1], spec.subject)
@@ -88,7 +89,7 @@ def _from_disk_or_built(spec: KernelSpec) -> SimpleNamespace:
     return SimpleNamespace(**entries)
 
 
-def _read(place: Folder, digest: str) -> dict[str, Any] | None:
+def _read(place: Folder, digest: str, sizes: Mapping[str, int]) -> dict[str, Any] | None:
     """Entries of a finished folder, or None where something is missing, truncated, altered or not ours."""
     try:
         with place.inside(digest) as home:
@@ -103,7 +104,7 @@ def _read(place: Folder, digest: str) -> dict[str, Any] | None:
             return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
-    return dict(load_objects(objects, symbols))
+    return dict(load_objects(objects, symbols, sizes))
 
 
 def _seal(manifest: dict[str, Any], digest: str) -> str:
@@ -116,21 +117,21 @@ def _build(spec: KernelSpec, place: Folder | None, digest: str) -> dict[str, Any
     """Compile, and keep what came of it where that can be done."""
     source = spec.source("compiled")
     try:
-        objects, symbols = compile_entries(source, entry_names(source))
+        objects, symbols = compile_entries(source)
     except UNKNOWN_INSIDE as error:
-        return _built_publicly(source, error)
+        return _built_publicly(source, spec.sizes, error)
     if place is not None and may_be_kept():
         try:
             _keep(place, digest, source, objects, symbols)
         except OSError as error:  # a full disk: the code is here, and is made again next time
             LOGGER.info("kernels are not kept in %s: %s", place.path, error.strerror or error)
-    return dict(load_objects(objects, symbols))
+    return dict(load_objects(objects, symbols, spec.sizes))
 
 
-def _built_publicly(source: str, error: Exception) -> dict[str, Any]:
+def _built_publicly(source: str, sizes: Mapping[str, int], error: Exception) -> dict[str, Any]:
     """The entries by public functions of Numba; raises what was wrong first where they do not serve either."""
     try:
-        entries = live_entries(source, entry_names(source))
+        entries = live_entries(source, sizes)
     except Exception:
         tell_of_source(source, error)
         raise error from None
@@ -189,7 +190,7 @@ def _move(place: Folder, work: str, digest: str) -> None:
             place.rename(work, digest)
             return
         except OSError:
-            if _read(place, digest) is not None:
+            if _read(place, digest, {}) is not None:
                 return
             aside = f".damaged-{os.urandom(4).hex()}"
             with contextlib.suppress(OSError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from collections.abc import Callable
 from math import inf, isnan, nan, pi, pow  # noqa: A004
 from typing import Any

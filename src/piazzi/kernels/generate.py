@@ -10,6 +10,7 @@ the factors of an update.  The functions:
 * ``complete(R)``: R with the constants' rows below it
 * ``measure_into(sensor, t, x, p, s, at, out, row)``: h
 * ``innovate(sensor, t, x, p, s, at, z, row, nu, H, out)``: z - h, angles wrapped, and H
+* ``measure_row(measured, row, t, x, p, out, at)``, ``innovate_row(measured, row, t, x, p, nu, H, out)``: of a row's station
 * ``measure_lanes(sensor, t, x, p, s, at, h)``, ``innovate_lanes(sensor, t, x, p, s, at, z, nu, H)``: the same of `LANES` runs
 """
 
@@ -39,11 +40,11 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
         "MN": model.width * model.n,
         "NN": model.n**2,
         "M_LANES": model.width * lanes,
+        "N_LANES": model.n * lanes,
         "MN_LANES": model.width * model.n * lanes,
         "NN_LANES": model.n**2 * lanes,
         "WORK": model.width * (model.width + model.n),
         "NUMBERS": model.most_numbers,
-        "GIVEN": max(len(model.given), 1),
         "FEW_DIGITS": 1e8,
         "LOST": 1e-15 * max(model.n, 4),  # of a diagonal: what is left below it is rounding
     }
@@ -56,11 +57,11 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
 
 
 def _arguments(model: Model, extra: Sequence[str] = ()) -> tuple[list[str], dict[sp.Symbol, str], str]:
-    """Argument names, the symbols they stand for, and the call from the vectors `x` and `p`."""
+    """Argument names, the symbols they stand for, and the call from the state `x` and what is given, `p`."""
     d = derive(model)
     names = {s: f"x{i}" for i, s in enumerate(d.x)} | {s: f"p{i}" for i, s in enumerate(d.p)} | {d.t: "t"}
     arguments = ["t", *extra, *(f"x{i}" for i in range(len(d.x))), *(f"p{i}" for i in range(len(d.p)))]
-    call = ", ".join(["t", *extra, *(f"x[{i}]" for i in range(len(d.x))), *(f"p[{i}]" for i in range(len(d.p)))])
+    call = ", ".join(["t", *extra, *(f"x[{i}]" for i in range(len(d.x))), *(f"p.parameters[{i}]" for i in range(len(d.p)))])
     return arguments, names, call
 
 
@@ -249,6 +250,14 @@ def _sensor_source(model: Model) -> str:
         "".join(functions)
         + _inline("measure_into(sensor, t, x, p, s, at, out, row)", *measure)
         + _inline("innovate(sensor, t, x, p, s, at, z, row, nu, H, out)", *innovate)
+        + _inline("measure_row(measured, row, t, x, p, out, at)", *_of_row("measure_into", "out, at"))
+        + _inline("innovate_row(measured, row, t, x, p, nu, H, out)", *_of_row("innovate", "measured.z, row * M, nu, H, out"))
         + _inline("measure_lanes(sensor, t, x, p, s, at, h)", *measure_lanes)
         + _inline("innovate_lanes(sensor, t, x, p, s, at, z, nu, H)", *innovate_lanes)
     )
+
+
+def _of_row(function: str, rest: str) -> tuple[str, str]:
+    """The same for a row, by its station."""
+    numbers = "measured.numbers, s * NUMBERS"
+    return "s = measured.station[row]", f"{function}(measured.sensor[s], t, x, p, {numbers}, {rest})"

@@ -5,12 +5,15 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-POINTER, INTEGER, REAL = "pointer", "integer", "real"
-_C_TYPES = {POINTER: ctypes.c_void_p, INTEGER: ctypes.c_int64, REAL: ctypes.c_double}
+from piazzi.kernels.address import address
+from piazzi.kernels.entries import flat
+from piazzi.kernels.members import BUNDLES, FLOATS, INDICES, INTEGER, REAL, TYPES, Bundle, Slot, check_array, checked
+
+_C_TYPES = {FLOATS: ctypes.c_void_p, INDICES: ctypes.c_void_p, INTEGER: ctypes.c_int64, REAL: ctypes.c_double}
 # Numba's wrapper mentions these for its error path, which kernels never take: they raise nothing
 _NEVER_CALLED = (
     "NRT_Free",
@@ -23,88 +26,95 @@ _NEVER_CALLED = (
 )
 
 
-class Entry:
-    """A compiled function.  Arrays are passed by address: they must be contiguous float64 or int64, which is checked."""
+class _Callable:
+    """A function of bundles, arrays and numbers, which are checked: number, kinds, and the sizes of all against each other.
 
-    def __init__(self, address: int, kinds: tuple[str, ...], keep: Any) -> None:
-        self._call = ctypes.CFUNCTYPE(None, *(_C_TYPES[k] for k in kinds))(address)
+    Bundles are checked once for every kind of problem, arrays that come by themselves in every call.
+    """
+
+    def __init__(self, name: str, signature: tuple[str, ...], sizes: Mapping[str, int]) -> None:
+        self.name, self.signature = name, signature
+        self._sizes, self._seen = dict(sizes), set[tuple[Any, ...]]()
+        self._loose = [(i, kind) for i, kind in enumerate(signature) if kind in (FLOATS, INDICES)]
+
+    def _check(self, args: tuple[Any, ...]) -> None:
+        if len(args) != len(self.signature):
+            raise TypeError(f"kernel {self.name} takes {len(self.signature)} arguments, not {len(args)}")
+        kinds = tuple([a.kind for a in args if isinstance(a, Bundle)])
+        for i, (a, kind) in enumerate(zip(args, self.signature, strict=True)):
+            what = f"argument {i} of kernel {self.name}"
+            if kind in BUNDLES:
+                if type(a).__name__ != kind:
+                    raise TypeError(f"{what} must be a {kind}, not {type(a).__name__}")
+            elif kind in (FLOATS, INDICES):
+                if not isinstance(a, np.ndarray):
+                    raise TypeError(f"{what} must be an array, not {type(a).__name__}")
+                check_array(what, kind, a)
+            else:
+                checked(what, Slot(kind, None), a, {})
+        known = dict(self._sizes)
+        for found in kinds:
+            for name, size in found.sizes.items():
+                if known.setdefault(name, size) != size:
+                    where = f"{size} in {found.bundle.__name__}, {known[name]} elsewhere"
+                    raise ValueError(f"kernel {self.name}: {name} is {where}")
+        self._seen.add(kinds)
+
+
+class Entry(_Callable):
+    """A compiled function."""
+
+    def __init__(self, name: str, address: int, signature: tuple[str, ...], sizes: Mapping[str, int], keep: Any) -> None:
+        super().__init__(name, signature, sizes)
+        self._call = ctypes.CFUNCTYPE(None, *(_C_TYPES[k] for k in flat(signature)))(address)
         self._keep = keep  # the code lives as long as something can call it
 
     def __call__(self, *args: Any) -> None:
-        self._call(*_addresses(args))
-
-    def after(self, first: Ready, *args: Any) -> None:
-        """The call with arguments that are ready before the others."""
-        self._call(*first.values, *_addresses(args))
+        try:
+            self._call(*self._values(args))
+        except ctypes.ArgumentError:
+            self._check(args)
+            raise
 
     def bind(self, *args: Any) -> Callable[[], None]:
         """The call with these arguments, for repeating: arrays are looked up once, and read and written where they are."""
-        ready = _addresses(args)
+        ready = self._values(args)
 
         def again(call: Any = self._call, keep: Any = (args, self._keep)) -> None:
             call(*ready)
 
         return again
 
-
-class Ready(NamedTuple):
-    """Arguments whose arrays have been looked up: their values for a call, and the arguments themselves, which must live on."""
-
-    values: tuple[Any, ...]
-    arguments: tuple[Any, ...]
-
-
-def ready(*args: Any) -> Ready:
-    """Arguments that are the same in many calls; raises TypeError where a kernel cannot take one."""
-    return Ready(tuple(_addresses(args)), args)
-
-
-_ARRAY, _FLOAT, _INDEX = np.ndarray, np.dtype(np.float64), np.dtype(np.int64)
-_HEADER: int = object.__basicsize__
-_read = ctypes.c_void_p.from_address
-
-
-def _field_after_header(a: np.ndarray[Any, Any]) -> int | None:
-    return _read(id(a) + _HEADER).value
+    def _values(self, args: tuple[Any, ...]) -> list[Any]:
+        """The arguments as object code takes them; one loop, because it runs at every call."""
+        out: list[Any] = []
+        kinds = []
+        for a in args:
+            if isinstance(a, Bundle):
+                out += a.values
+                kinds.append(a.kind)
+            else:
+                out.append(address(a) if isinstance(a, np.ndarray) else a)
+        if len(args) != len(self.signature) or tuple(kinds) not in self._seen:
+            self._check(args)
+        for i, kind in self._loose:
+            if args[i].dtype is not TYPES[kind] or not args[i].flags.c_contiguous:
+                check_array(f"argument {i} of kernel {self.name}", kind, args[i])
+        return out
 
 
-def _attribute(a: np.ndarray[Any, Any]) -> int | None:
-    return a.ctypes.data
-
-
-# NumPy's C interface fixes the address of the numbers as the first field after an array's header; reading it there takes a
-# sixth of the time of the attribute, which is for interpreters that lay objects out otherwise
-_probe = np.zeros(1)
-_data_pointer = _field_after_header if _field_after_header(_probe) == _attribute(_probe) else _attribute
-
-
-def _addresses(args: tuple[Any, ...]) -> list[Any]:
-    """The arguments with arrays replaced by the addresses of their numbers; one loop, because it runs at every call."""
-    out = []
-    for a in args:
-        if type(a) is _ARRAY or isinstance(a, _ARRAY):
-            kind = a.dtype
-            if not a.flags.c_contiguous or (kind is not _FLOAT and kind is not _INDEX and kind not in (_FLOAT, _INDEX)):
-                raise TypeError(f"a kernel needs contiguous float64 or int64, not {kind} with strides {a.strides}")
-            out.append(_data_pointer(a))
-        else:
-            out.append(a)
-    return out
-
-
-class PlainEntry:
+class PlainEntry(_Callable):
     """The same function uncompiled: arrays are seen as flat ones."""
 
-    def __init__(self, function: Callable[..., None]) -> None:
+    def __init__(self, name: str, function: Callable[..., None], signature: tuple[str, ...], sizes: Mapping[str, int]) -> None:
+        super().__init__(name, signature, sizes)
         self._function = function
 
     def __call__(self, *args: Any) -> None:
+        self._check(args)
+        members = [m for a in args for m in (a.members if isinstance(a, Bundle) else (a,))]
         with np.errstate(all="ignore"):
-            self._function(*[a.reshape(-1) if isinstance(a, np.ndarray) else a for a in args])
-
-    def after(self, first: Ready, *args: Any) -> None:
-        """The call with arguments that are ready before the others."""
-        self(*first.arguments, *args)
+            self._function(*[m.reshape(-1) if isinstance(m, np.ndarray) else m for m in members])
 
     def bind(self, *args: Any) -> Callable[[], None]:
         """The call with these arguments, for repeating."""
@@ -149,8 +159,10 @@ def machine_options() -> dict[str, Any]:
     return {"cpu": cpu, "features": features, "opt": 3, "reloc": reloc, "codemodel": "jitdefault", "jit": True}
 
 
-def load_objects(objects: Mapping[str, bytes], symbols: Mapping[str, tuple[str, tuple[str, ...]]]) -> dict[str, Entry]:
-    """Entries by name from object files and, for each, its symbol and the kinds of its arguments."""
+def load_objects(
+    objects: Mapping[str, bytes], symbols: Mapping[str, tuple[str, tuple[str, ...]]], sizes: Mapping[str, int]
+) -> dict[str, Entry]:
+    """Entries by name from object files and, for each, its symbol and what it takes; `sizes` are those of the model."""
     import llvmlite.binding as llvm
 
     _prepare()
@@ -161,6 +173,6 @@ def load_objects(objects: Mapping[str, bytes], symbols: Mapping[str, tuple[str, 
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
-        symbol, kinds = symbols[name]
-        entries[name] = Entry(engine.get_function_address(symbol), kinds, engine)
+        symbol, signature = symbols[name]
+        entries[name] = Entry(name, engine.get_function_address(symbol), signature, sizes, engine)
     return entries

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Callable
 from math import inf, isnan, nan, pi
 from typing import Any
@@ -60,7 +61,7 @@ def matrix(*rows: Array) -> Array:
     return np.array(rows, dtype=float)
 
 
-def fused(s: float, x: Array, y: Array) -> Array:
+def fused(s: float, x: Any, y: Any) -> Any:
     """s x + y."""
     return s * x + y
 

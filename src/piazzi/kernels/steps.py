@@ -93,7 +93,7 @@ def kepler_source(model: Model, mu: str | float, position: Any, velocity: Any) -
     if mu in model.names:
         m = f"x[{model.names.index(mu)}]"
     else:
-        m = f"p[{model.given.index(str(mu))}]" if mu in model.given else repr(mu)
+        m = f"p.parameters[{model.given.index(str(mu))}]" if mu in model.given else repr(mu)
     dot = {
         name: " + ".join(f"x[{i}]*x[{j}]" for i, j in zip(*pair, strict=True))
         for name, pair in {"rr": (r, r), "rv": (r, v), "vv": (v, v)}.items()

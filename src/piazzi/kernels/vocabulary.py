@@ -7,6 +7,34 @@ from __future__ import annotations
 
 from typing import Any
 
+from piazzi.kernels.bundle import (  # noqa: F401
+    Accuracy,
+    Belief,
+    Beliefs,
+    Border,
+    Chain,
+    Drawn,
+    Ends,
+    Errors,
+    Factor,
+    Gate,
+    Given,
+    Innovations,
+    Interval,
+    JointRoot,
+    Measured,
+    Noiseless,
+    Observation,
+    Report,
+    RootForm,
+    Row,
+    Run,
+    Samples,
+    Smoothed,
+    Stations,
+    Whole,
+    Window,
+)
 from piazzi.kernels.plain import *  # noqa: F403
 
 ND: int
@@ -15,12 +43,12 @@ M: int
 MN: int
 NN: int
 M_LANES: int
+N_LANES: int
 MN_LANES: int
 NN_LANES: int
 WORK: int
 NUMBERS: int
 LANES: int
-GIVEN: int
 LOST: float
 FEW_DIGITS: float
 MAX_STEPS: int
@@ -54,6 +82,8 @@ remember: Any
 complete: Any
 measure_into: Any
 innovate: Any
+measure_row: Any
+innovate_row: Any
 measure_lanes: Any
 innovate_lanes: Any
 # written in fragments/coast_*.py, noise_*.py, axes*.py, transition*.py, update_*.py
@@ -85,21 +115,24 @@ linearize_rows: Any
 marginal_covariances: Any
 forward: Any
 record_epoch: Any
-retire: Any
-settle: Any
+marginalize_oldest: Any
+solve_window: Any
 forward_following: Any
 cancelled: Any
 Q_matrix: Any
 back_through_epoch: Any
+predict_deviation: Any
 backward: Any
 absorb_epoch: Any
-surprise: Any
+squared_innovation: Any
 update_epoch_guarded: Any
 # written in fragments/graph_linearize.py
 weigh_dynamics: Any
 # written in fragments/*_lanes.py
 travel_lanes: Any
 transition_lanes: Any
+ones: Any
+note_error: Any
 squared_lanes: Any
 nees_lanes: Any
 # written in fragments/border.py

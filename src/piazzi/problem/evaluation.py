@@ -10,6 +10,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.expressions import evaluate
 from piazzi.kernels import Integrator, KernelSpec
+from piazzi.kernels.bundle import Given
 from piazzi.model import Model
 from piazzi.model.definitions import with_values
 from piazzi.problem.checks import Array, numeric
@@ -30,7 +31,7 @@ def _states(model: Model, x: Any, t: Any) -> tuple[Array, Array, bool]:
     return many, times, out.ndim == 1
 
 
-def rates(spec: KernelSpec, entry: str, given: Array, x: Any, t: Any) -> Array:
+def rates(spec: KernelSpec, entry: str, given: Given, x: Any, t: Any) -> Array:
     """dx/dt, same shape as the states, or its derivative F, (n, n) or (K, n, n), as `entry` says."""
     model = spec.model
     if model.discrete:
@@ -41,7 +42,7 @@ def rates(spec: KernelSpec, entry: str, given: Array, x: Any, t: Any) -> Array:
     return out[0] if one else out
 
 
-def step(spec: KernelSpec, integrator: Integrator, given: Array, x: Any, dt: float, t: Any) -> tuple[Array, Array]:
+def step(spec: KernelSpec, integrator: Integrator, given: Given, x: Any, dt: float, t: Any) -> tuple[Array, Array]:
     """Next states and the derivative of the step."""
     if not np.isfinite(dt):
         raise ValueError(f"dt is {dt} s; it must be finite")
@@ -52,7 +53,7 @@ def step(spec: KernelSpec, integrator: Integrator, given: Array, x: Any, dt: flo
     return (out[0], Phi[0]) if one else (out, Phi)
 
 
-def measure(spec: KernelSpec, sensor: int, numbers: Array, m: int, given: Array, x: Any, t: Any) -> Array:
+def measure(spec: KernelSpec, sensor: int, numbers: Array, m: int, given: Given, x: Any, t: Any) -> Array:
     """h of a station with m components, (m,) or (K, m)."""
     many, times, one = _states(spec.model, x, t)
     out = np.empty((len(many), spec.model.width))
@@ -61,12 +62,12 @@ def measure(spec: KernelSpec, sensor: int, numbers: Array, m: int, given: Array,
     return out[0] if one else out
 
 
-def measurement_jacobian(spec: KernelSpec, sensor: int, numbers: Array, m: int, given: Array, x: Any, t: Any) -> Array:
+def measurement_jacobian(spec: KernelSpec, sensor: int, numbers: Array, m: int, given: Given, x: Any, t: Any) -> Array:
     """H = dh/dx of a station with m components, (m, n) or (K, m, n)."""
     many, times, one = _states(spec.model, x, t)
     M, n = spec.model.width, spec.model.n
-    out, nu, H = np.empty((len(many), M, n)), np.zeros(M), np.zeros((M, n))
-    kernels.load(spec).evaluate_measurement_jacobian(len(many), sensor, times, many, given, numbers, nu, H, out)
+    out = np.empty((len(many), M, n))
+    kernels.load(spec).evaluate_measurement_jacobian(len(many), sensor, times, many, given, numbers, out)
     out = out[:, :m]
     return out[0] if one else out
 

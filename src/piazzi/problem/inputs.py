@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from piazzi.kernels import Ready, ready
+from piazzi.kernels.bundle import Belief, Given, Measured, Run
 from piazzi.problem.checks import Array
 from piazzi.problem.problem import Problem
 from piazzi.problem.tracking import Tracking
@@ -34,7 +34,7 @@ class Inputs:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without addresses of arrays, which mean nothing elsewhere."""
-        return {name: value for name, value in self.__dict__.items() if name != "_run"}
+        return {name: value for name, value in self.__dict__.items() if name != "_bundles"}
 
     @property
     def epochs(self) -> int:
@@ -45,36 +45,41 @@ class Inputs:
         """Rows of the epoch that has the most."""
         return int(np.diff(self.first_row).max())
 
-    def measured(self, problem: Problem) -> tuple[Array, ...]:
-        """The arguments that describe the measurements, in the order all kernels share."""
-        return (
-            self.first_row,
-            self.z,
-            self.station,
-            problem.station_sensor,
-            problem.station_numbers,
-            problem.station_noise,
-            problem.station_correlated,
-        )
-
-    def run_of(self, problem: Problem) -> Ready:
-        """The arguments that the kernels of whole filter runs begin with, looked up once for all of them."""
-        kept: tuple[Problem, Ready] | None = self.__dict__.get("_run")
+    def bundles(self, problem: Problem) -> tuple[Run, Given, Measured, Belief]:
+        """Run, model, measurements and prior as kernels take them, looked up once for all estimators."""
+        kept: tuple[Problem, tuple[Run, Given, Measured, Belief]] | None = self.__dict__.get("_bundles")
         if kept is None or kept[0] is not problem:
-            arguments = ready(
-                self.epochs,
-                self.t,
-                self.t_prior,
-                self.count,
-                self.scale,
-                *self.measured(problem),
-                problem.given,
-                problem.process_noise.covariance,
-                problem.mean,
-                problem.covariance,
+            run = Run(
+                epochs=self.epochs,
+                t_prior=self.t_prior,
+                t=self.t,
+                count=self.count,
+                scale=self.scale,
+                first_row=self.first_row,
+                Q=problem.process_noise.covariance,
             )
-            kept = self.__dict__["_run"] = problem, arguments
+            measured = measured_by(problem, self.z, self.station)
+            kept = self.__dict__["_bundles"] = problem, (run, problem.given_bundle, measured, problem.prior_bundle)
         return kept[1]
+
+
+def epoch_alone(problem: Problem, t: float, rows: int) -> Run:
+    """A run of one epoch that a prediction has reached already."""
+    one, first_row = np.array([t]), np.array([0, rows])
+    Q = problem.process_noise.covariance
+    return Run(epochs=1, t_prior=t, t=one, count=np.array([1]), scale=np.zeros(1), first_row=first_row, Q=Q)
+
+
+def measured_by(problem: Problem, z: Array, station: Array) -> Measured:
+    """Measurements (J, M) of stations (J,), which are numbered as in the problem."""
+    return Measured(
+        z=z,
+        station=station,
+        sensor=problem.station_sensor,
+        numbers=problem.station_numbers,
+        R=problem.station_noise,
+        correlated=problem.station_correlated,
+    )
 
 
 def prepare(problem: Problem, tracking: Tracking) -> Inputs:
@@ -89,7 +94,7 @@ def prepare(problem: Problem, tracking: Tracking) -> Inputs:
         z = tracking.padded(problem.model.width)
         _check_resolved(problem, tracking, station, z)
         inputs = Inputs(tracking.times, start, count, scale, tracking.first_row, z, station)
-        inputs.run_of(problem)
+        inputs.bundles(problem)
         kept = _PREPARED[tracking] = problem, inputs
     return kept[1]
 

@@ -1,4 +1,4 @@
-"""Manoeuvres as kernels take them: in order of time, one after the other, behind the parameters."""
+"""Manoeuvres as kernels take them: in order of time, one after the other."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.kernels import Discrete, Integrator, Kepler, KernelSpec, RungeKutta4
+from piazzi.kernels.bundle import Belief, Given
 from piazzi.model import Model
 from piazzi.problem import evaluation, manoeuvres
 from piazzi.problem.checks import Array, check_span, covariance, finite_vector, frozen, lock, numeric
@@ -206,10 +207,19 @@ class Problem:
 
     @cached_property
     def given(self) -> Array:
-        """Values of the parameters that are not estimated, at least one number long; behind them the manoeuvres, if any."""
+        """Values of the parameters that are not estimated, at least one number long."""
         values = [self.parameters[name] for name in self.model.given]
-        numbers = [v.mean[0] if isinstance(v, Gaussian) else v for v in values] or [0.0]
-        return frozen([*numbers, *manoeuvres.packed(self.manoeuvres, self.model)] if self.manoeuvres else numbers)
+        return frozen([v.mean[0] if isinstance(v, Gaussian) else v for v in values] or [0.0])
+
+    @cached_property
+    def given_bundle(self) -> Given:
+        """What kernels are told of the model."""
+        return Given(parameters=self.given, manoeuvres=frozen(manoeuvres.packed(self.manoeuvres, self.model)))
+
+    @property
+    def prior_bundle(self) -> Belief:
+        """The prior of everything estimated, for kernels, which do not write to it."""
+        return Belief(mean=self.mean, covariance=self.covariance)
 
     @cached_property
     def station_sensor(self) -> Array:
@@ -348,24 +358,24 @@ class Problem:
 
     def dynamics(self, x: Any, t: Any = 0.0) -> Array:
         """dx/dt at one state (n,) or many (K, n), same shape."""
-        return evaluation.rates(self.spec("transition", "rates"), "evaluate_dynamics", self.given, x, t)
+        return evaluation.rates(self.spec("transition", "rates"), "evaluate_dynamics", self.given_bundle, x, t)
 
     def dynamics_jacobian(self, x: Any, t: Any = 0.0) -> Array:
         """F = df/dx at one state (n, n) or many (K, n, n)."""
-        return evaluation.rates(self.spec("transition", "rates"), "evaluate_dynamics_jacobian", self.given, x, t)
+        return evaluation.rates(self.spec("transition", "rates"), "evaluate_dynamics_jacobian", self.given_bundle, x, t)
 
     def step(self, x: Any, dt: float, t: Any = 0.0) -> tuple[Array, Array]:
         """The state `dt` seconds later and the derivative of that step, shapes (n,), (n, n) or (K, n), (K, n, n)."""
         assert self.integrator is not None
-        return evaluation.step(self.spec("transition", "functions"), self.integrator, self.given, x, dt, t)
+        return evaluation.step(self.spec("transition", "functions"), self.integrator, self.given_bundle, x, dt, t)
 
     def measure(self, station: str, x: Any, t: Any = 0.0) -> Array:
         """Noiseless measurement h of a station, (m,) or (K, m)."""
-        return evaluation.measure(*self._measured(station), self.given, x, t)
+        return evaluation.measure(*self._measured(station), self.given_bundle, x, t)
 
     def measurement_jacobian(self, station: str, x: Any, t: Any = 0.0) -> Array:
         """H = dh/dx of a station, (m, n) or (K, m, n)."""
-        return evaluation.measurement_jacobian(*self._measured(station), self.given, x, t)
+        return evaluation.measurement_jacobian(*self._measured(station), self.given_bundle, x, t)
 
     def _measured(self, station: str) -> tuple[KernelSpec, int, Array, int]:
         """Compiled module, index of the sensor, own numbers and number of components of a station."""

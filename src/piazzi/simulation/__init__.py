@@ -11,6 +11,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.problem import Gaussian, Problem, Tracking, Truth
 from piazzi.problem.checks import Array, check_span, finite_vector, numeric
+from piazzi.problem.inputs import Inputs
 from piazzi.simulation.rule import MOST_DRAWS, NoTruthError, Rule
 
 __all__ = [
@@ -82,24 +83,8 @@ def propagate(
     row_station, first_row = np.tile(index, K), np.arange(K + 1, dtype=np.int64) * len(index)
     states, z = np.empty((K, n)), np.empty((K * len(index), M))
     library = kernels.load(actual.spec("transition", actual.noise_fragment, "simulate"))
-    library.run_simulation(
-        K,
-        epochs,
-        start,
-        count,
-        scale,
-        first_row,
-        row_station,
-        actual.station_sensor,
-        actual.station_numbers,
-        actual.given,
-        actual.process_noise.covariance,
-        first,
-        w,
-        np.empty((n, n)),
-        states,
-        z,
-    )
+    run, p, measured, _ = Inputs(epochs, start, count, scale, first_row, z, row_station).bundles(actual)
+    library.run_simulation(run, p, measured, first, w, np.empty((n, n)), states)
     check_finite(problem, epochs, first, states)
     if v is not None:
         z += np.einsum("jab,jb->ja", np.linalg.cholesky(problem.station_noise)[row_station], v)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from piazzi import kernels
+from piazzi.kernels.bundle import Accuracy, Drawn, Ends, Given, Run, Samples, Stations
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -76,6 +77,35 @@ class Layout:
             out[g, list(columns)] = 1
         return out
 
+    def bundles(self, moving: Problem) -> tuple[Run, Given, Stations]:
+        """Epochs, model and stations as kernels take them, for runs that move as `moving` says; the last ones are kept."""
+        kept: tuple[Problem, tuple[Run, Given, Stations]] | None = self.__dict__.get("_bundles")
+        if kept is None or kept[0] is not moving:
+            start, count, scale = moving.intervals(self.times)
+            run = Run(
+                epochs=len(self.times),
+                t_prior=start,
+                t=self.times,
+                count=count,
+                scale=scale,
+                first_row=self.first_row,
+                Q=moving.process_noise.covariance,
+            )
+            kept = self.__dict__["_bundles"] = moving, (run, moving.given_bundle, self._stations(moving))
+        return kept[1]
+
+    def _stations(self, moving: Problem) -> Stations:
+        return Stations(
+            station=self.station,
+            sensor=moving.station_sensor,
+            width=self.width,
+            angle=self.angle,
+            numbers=moving.station_numbers,
+            R=self.problem.station_noise,
+            W=self.whitening,
+            correlated=self.problem.station_correlated,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Scores:
@@ -115,101 +145,38 @@ def simulate_runs(layout: Layout, actual: Problem, first: Array, w: Array, v: Ar
     w, v : (M, K, n) and (M, J, m), standard normal
     noisy : whether the sensors have errors
     """
-    M, K = w.shape[:2]
-    J, m = v.shape[1:]
-    start, count, scale = actual.intervals(layout.times)
-    lanes = lane_count()
+    lanes, M = lane_count(), len(w)
     first, w, v = _padded(lanes, first, w, v)
-    truth, z = np.empty(w.shape), np.full(v.shape, np.nan)
-    _library(actual, lanes).simulate_lanes(
-        len(w),
-        K,
-        J,
-        layout.times,
-        start,
-        count,
-        scale,
-        layout.first_row,
-        layout.station,
-        actual.station_sensor,
-        layout.width,
-        layout.angle,
-        actual.station_numbers,
-        layout.root if noisy else np.zeros_like(layout.root),
-        actual.given,
-        semidefinite_root(actual.process_noise.covariance),
-        first,
-        w,
-        v,
-        np.ones(1),
-        np.empty(m * lanes),
-        truth,
-        z,
-    )
-    return truth[:M], z[:M]
+    R_root = layout.root if noisy else np.zeros_like(layout.root)
+    drawn = Drawn(first=first, w=w, v=v, Q_root=semidefinite_root(actual.process_noise.covariance), R_root=R_root)
+    samples = Samples(many=len(w), rows=v.shape[1], truth=np.empty(w.shape), z=np.full(v.shape, np.nan))
+    run, p, stations = layout.bundles(actual)
+    _library(actual, lanes).simulate_lanes(run, p, stations, drawn, samples)
+    return samples.truth[:M], samples.z[:M]
 
 
-def filter_runs(
-    layout: Layout, z: Array, truth: Array | None = None, *, at_truth: bool = False
-) -> tuple[Array, Array, Scores | None]:
-    """The extended Kalman filter on M runs at once, measurements (M, J, m).
+def filter_runs(layout: Layout, z: Array, truth: Array, *, at_truth: bool = False) -> tuple[Array, Array, Scores]:
+    """The extended Kalman filter on M runs at once, measurements (M, J, m) of true states (M, K, n).
 
     Returns
     -------
     mean, covariance : (M, n) and (M, n, n), at the last epoch
-    scores : Scores, or None without `truth`, (M, K, n)
+    scores : Scores
 
     With `at_truth`, everything is linearised at the truth and the mean stays there: the covariances are then the Cramer-Rao
     bound of each run.
     """
-    problem = layout.problem
-    M, J, K, n = len(z), z.shape[1], len(layout.times), problem.model.n
-    start, count, scale = problem.intervals(layout.times)
-    lanes, groups = lane_count(), len(layout.member)
-    scored = truth is not None
-    z, states = _padded(lanes, z, np.zeros((M, 0, 0)) if truth is None else truth)
-    runs = len(z)
-    mean, P, lowest = np.empty((runs, n)), np.empty((runs, n, n)), np.empty(runs)
-    squared, spread = np.empty((2, runs, groups, K if scored else 0))
-    nees, nis = np.empty((runs, K if scored else 0)), np.empty((runs, J if scored else 0))
-    _library(problem, lanes).filter_lanes(
-        runs,
-        K,
-        J,
-        layout.times,
-        start,
-        count,
-        scale,
-        layout.first_row,
-        z,
-        layout.station,
-        problem.station_sensor,
-        layout.width,
-        problem.station_numbers,
-        problem.station_noise,
-        layout.whitening,
-        problem.station_correlated,
-        problem.given,
-        problem.process_noise.covariance,
-        np.tile(problem.mean, (runs, 1)),
-        problem.covariance,
-        np.ones(1),
-        int(at_truth),
-        int(scored),
-        states,
-        layout.member,
-        groups,
-        np.empty((n * n + 2 * n) * lanes),
-        mean,
-        P,
-        squared,
-        spread,
-        nees,
-        nis,
-        lowest,
-    )
-    scores = Scores(squared[:M], spread[:M], nees[:M], nis[:M], lowest[:M]) if scored else None
-    return mean[:M], P[:M], scores
+    problem, lanes, M = layout.problem, lane_count(), len(z)
+    z, truth = _padded(lanes, z, truth)
+    (runs, J, _), (_, K, n), member = z.shape, truth.shape, layout.member
+    G = len(member)
+    samples, ends = Samples(many=runs, rows=J, truth=truth, z=z), Ends.empty(runs=runs, N=n)
+    squared, spread = np.empty((2, runs, G, K))
+    nees, nis, lowest = np.empty((runs, K)), np.empty((runs, J)), np.empty(runs)
+    accuracy = Accuracy(groups=G, member=member, squared=squared, spread=spread, nees=nees, nis=nis, lowest=lowest)
+    run, p, stations = layout.bundles(problem)
+    _library(problem, lanes).filter_lanes(run, p, stations, problem.prior_bundle, samples, int(at_truth), ends, accuracy)
+    return ends.mean[:M], ends.covariance[:M], Scores(squared[:M], spread[:M], nees[:M], nis[:M], lowest[:M])
 
 
 def semidefinite_root(Q: Array) -> Array:

@@ -39,93 +39,100 @@ def invert_upper(R, out, size):
 
 
 @inline
-def begin_border(C, root, R, y, S):
+def begin_border(border):
     """The unknowns' prior: no deviation, unit variance; the first state through the rows of `root`, the constants later."""
-    size = N + C
+    size = N + border.constants
     for i in range(size):
-        y[i] = 0.0
+        border.y[i] = 0.0
         for j in range(size):
-            R[i * size + j] = 1.0 if i == j else 0.0
-        store(S, i * N, load_vector(root, i * N, N) if i < N else unit(-1, N))
+            border.R[i * size + j] = 1.0 if i == j else 0.0
+        store(border.S, i * N, load_vector(border.root, i * N, N) if i < N else unit(-1, N))
 
 
 @inline
-def advance_border(k, C, F, d, c, B, offset, sigma, S):
-    """Deviation and sensitivities of state k from those of state k - 1, whose step has the derivative F by the state."""
-    d = F @ d + c
+def advance_border(k, d, defect, border):
+    """Deviation and sensitivities of state k from those of state k - 1."""
+    C, S, F = border.constants, border.S, load_matrix(border.A, (k - 1) * N * N, N, N)
+    d = F @ d + defect
     for i in range(C):
-        by_constant = load_vector(B, ((k - 1) * C + i) * N, N)
-        d = d + offset[i] * by_constant
-        store(S, (N + i) * N, sigma[i] * by_constant + F @ load_vector(S, (N + i) * N, N))
+        by_constant = load_vector(border.B, ((k - 1) * C + i) * N, N)
+        d = d + border.offset[i] * by_constant
+        store(S, (N + i) * N, border.sigma[i] * by_constant + F @ load_vector(S, (N + i) * N, N))
     for j in range(N):
         store(S, j * N, F @ load_vector(S, j * N, N))
     return d
 
 
 @inline
-def absorb_row(h, G, at, nu, C, d, P, offset, sigma, R, y, S, row, size):
-    """One measurement of unit noise: the chain's update for given unknowns; its innovation goes into the triangle."""
+def absorb_row(h, nu, at, of_constants, d, P, border):
+    """One measurement of unit noise: the chain's update for given unknowns; its innovation goes into the triangle.
+
+    Its derivatives by the constants stand at `at`; one that only says something of the states has none.
+    """
+    size, C, S, row = N + border.constants, border.constants if of_constants else 0, border.S, border.row
     Ph = h @ P
     variance = h @ Ph + 1.0
     K = (1.0 / variance) * Ph
     e = nu - h @ d
     for i in range(C):
-        e -= G[at + i] * offset[i]
+        e -= border.G[at + i] * border.offset[i]
     weight = 1.0 / sqrt(variance)
     for j in range(size):
         s = load_vector(S, j * N, N)
         effect = h @ s
         if j >= N and j - N < C:
-            effect += G[at + j - N] * sigma[j - N]
+            effect += border.G[at + j - N] * border.sigma[j - N]
         store(S, j * N, s - effect * K)
         row[j] = weight * effect
-    rotate(R, y, row, weight * e, size)
+    rotate(border.R, border.y, row, weight * e, size)
     B = P - outer(Ph, K)
     return d + e * K, B + outer(K, K - h @ B)
 
 
 @inline
-def width_of_row(h, G, at, C, P, sigma, S, inverse, row, size):
+def width_of_row(h, at, P, border):
     """Predicted variance of a measurement of unit noise, without the noise."""
+    size, row = N + border.constants, border.row
     for j in range(size):
-        row[j] = h @ load_vector(S, j * N, N)
+        row[j] = h @ load_vector(border.S, j * N, N)
         if j >= N:
-            row[j] = row[j] + G[at + j - N] * sigma[j - N]
+            row[j] = row[j] + border.G[at + j - N] * border.sigma[j - N]
     total = h @ (h @ P)
     for q in range(size):
         s = 0.0
         for j in range(q + 1):
-            s += row[j] * inverse[j * size + q]
+            s += row[j] * border.inverse[j * size + q]
         total += s * s
     return total
 
 
 @inline
-def record_belief(k, C, d, P, offset, sigma, y, S, inverse, row, W, own, d_pred, P_pred):
-    """Predicted deviation and covariance of states and constants together, unknowns included, at position k."""
+def record_belief(k, d, P, border, whole):
+    """Predicted deviation and covariance of states and constants together, unknowns included, of state k."""
+    C, S, row, inverse, W = border.constants, border.S, border.row, border.inverse, border.W
     size = N + C
     for q in range(size):
         s = 0.0
         for j in range(q, size):
-            s += inverse[q * size + j] * y[j]
+            s += inverse[q * size + j] * border.y[j]
         row[q] = s
     mean = d
     for j in range(size):
         mean = mean + row[j] * load_vector(S, j * N, N)
-    store(d_pred, k * size, mean)
+    store(whole.mean, k * size, mean)
     for i in range(C):
-        d_pred[k * size + N + i] = offset[i] + sigma[i] * row[N + i]
+        whole.mean[k * size + N + i] = border.offset[i] + border.sigma[i] * row[N + i]
     for q in range(size):
         w = unit(-1, N)
         for j in range(q + 1):
             w = w + inverse[j * size + q] * load_vector(S, j * N, N)
         store(W, q * size, w)
         for i in range(C):
-            W[q * size + N + i] = sigma[i] * inverse[(N + i) * size + q]
-    store(own, 0, P)
+            W[q * size + N + i] = border.sigma[i] * inverse[(N + i) * size + q]
+    store(border.own, 0, P)
     for i in range(size):
         for j in range(size):
-            s = own[i * N + j] if i < N and j < N else 0.0
+            s = border.own[i * N + j] if i < N and j < N else 0.0
             for q in range(size):
                 s += W[q * size + i] * W[q * size + j]
-            P_pred[(k * size + i) * size + j] = s
+            whole.covariance[(k * size + i) * size + j] = s

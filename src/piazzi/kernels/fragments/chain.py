@@ -20,37 +20,37 @@ def update_scalar(d, P, h, nu):
 
 
 @inline
-def absorb_epoch(first, last, d, P, nu, H):
+def absorb_epoch(first, last, d, P, chain):
     """Deviation and covariance after the measurements first ... last - 1, and the sum of their squared innovations."""
     fit = 0.0
     for c in range(first, last):
-        if not isnan(nu[c]):
-            d, P, _, _, squared = update_scalar(d, P, load_vector(H, c * N, N), nu[c])
+        if not isnan(chain.nu[c]):
+            d, P, _, _, squared = update_scalar(d, P, load_vector(chain.H, c * N, N), chain.nu[c])
             fit += squared
     return d, P, fit
 
 
 @inline
-def damp(d, P, damping, tether, nu, K_all, slot, keep):
+def damp(d, P, damping, chain, slot, keep):
     """Measurements "no deviation" of every state, as sharp as `damping` prior covariances (Levenberg-Marquardt)."""
     for i in range(N):
-        h = sqrt(damping) * load_vector(tether, i * N, N)
+        h = sqrt(damping) * load_vector(chain.scaling, i * N, N)
         d, P, K, g, _ = update_scalar(d, P, h, 0.0)
         if keep:
-            store(K_all, (slot + i) * (N + 1), K)
-            K_all[(slot + i) * (N + 1) + N] = g
+            store(chain.gains, (slot + i) * (N + 1), K)
+            chain.gains[(slot + i) * (N + 1) + N] = g
     return d, P
 
 
 @inline
-def follow_epoch(first, last, d, P, P_old, C, nu, H):
+def follow_epoch(first, last, d, P, P_old, C, chain):
     """As `absorb_epoch`, and the same for the oldest state: its covariance, and C = Cov(this state, the oldest)."""
     for c in range(first, last):
-        if not isnan(nu[c]):
-            h = load_vector(H, c * N, N)
+        if not isnan(chain.nu[c]):
+            h = load_vector(chain.H, c * N, N)
             u = h @ C
             S = h @ (h @ P) + 1.0
-            d, P, K, _, _ = update_scalar(d, P, h, nu[c])
+            d, P, K, _, _ = update_scalar(d, P, h, chain.nu[c])
             P_old = P_old - outer((1.0 / S) * u, u)
             C = C - outer(K, u)
     return d, P, P_old, C
@@ -70,24 +70,30 @@ def cancelled(P_old, P_start):
 
 
 @inline
-def forward_following(a, W, x, scale, first_row, Q, Q_all, f, Phi, nu, H, m, P, d_pred, P_pred):
+def predict_deviation(j, k, d, P, run, chain):
+    """Deviation and covariance of state j of the stretch, which is state k, from those of the one before."""
+    F = load_matrix(chain.Phi, (j - 1) * N * N, N, N)
+    P = F @ P @ F.T + noise_at(j, run.scale[k], Q_matrix(run.Q), chain.Q_all)
+    return F @ d + (load_vector(chain.f, (j - 1) * N, N) - load_vector(chain.x, k * N, N)), P
+
+
+@inline
+def forward_following(a, W, run, chain, m, P):
     """As `forward`, undamped; the covariance of the oldest state given all measurements of the stretch comes with it."""
-    base = first_row[a]
-    d = m - load_vector(x, a * N, N)
+    base = run.first_row[a]
+    d = m - load_vector(chain.x, a * N, N)
     C = P
     P_old = P
     for j in range(W):
         k = a + j
         if j > 0:
-            F = load_matrix(Phi, (j - 1) * N * N, N, N)
-            C = F @ C
-            P = F @ P @ F.T + noise_at(j, scale[k], Q, Q_all)
-            d = F @ d + (load_vector(f, (j - 1) * N, N) - load_vector(x, k * N, N))
+            C = load_matrix(chain.Phi, (j - 1) * N * N, N, N) @ C
+            d, P = predict_deviation(j, k, d, P, run, chain)
         P = symmetric(P)
-        store(d_pred, j * N, d)
-        store(P_pred, j * N * N, P)
-        first = (first_row[k] - base) * M
-        d, P, P_old, C = follow_epoch(first, (first_row[k + 1] - base) * M, d, P, P_old, C, nu, H)
+        store(chain.d_pred, j * N, d)
+        store(chain.P_pred, j * N * N, P)
+        first = (run.first_row[k] - base) * M
+        d, P, P_old, C = follow_epoch(first, (run.first_row[k + 1] - base) * M, d, P, P_old, C, chain)
         if j == 0:  # its own measurements in Joseph form: a wide prior less what they say would leave no digits
             C = P
             P_old = P
@@ -95,30 +101,29 @@ def forward_following(a, W, x, scale, first_row, Q, Q_all, f, Phi, nu, H, m, P, 
 
 
 @inline
-def forward(a, W, x, scale, first_row, Q, Q_all, f, Phi, nu, H, m, P, damping, tether, d_pred, P_pred):
+def forward(a, W, run, chain, m, P, damping):
     """Predicted deviations and covariances of states a ... a + W - 1; those of the last after its measurements are returned."""
-    base = first_row[a]
-    d = m - load_vector(x, a * N, N)
+    base = run.first_row[a]
+    d = m - load_vector(chain.x, a * N, N)
     fit = 0.0
     for j in range(W):
         k = a + j
         if j > 0:
-            F = load_matrix(Phi, (j - 1) * N * N, N, N)
-            P = F @ P @ F.T + noise_at(j, scale[k], Q, Q_all)
-            d = F @ d + (load_vector(f, (j - 1) * N, N) - load_vector(x, k * N, N))
+            d, P = predict_deviation(j, k, d, P, run, chain)
         P = symmetric(P)
-        store(d_pred, j * N, d)
-        store(P_pred, j * N * N, P)
-        d, P, squared = absorb_epoch((first_row[k] - base) * M, (first_row[k + 1] - base) * M, d, P, nu, H)
+        store(chain.d_pred, j * N, d)
+        store(chain.P_pred, j * N * N, P)
+        d, P, squared = absorb_epoch((run.first_row[k] - base) * M, (run.first_row[k + 1] - base) * M, d, P, chain)
         fit += squared
         if damping > 0.0:
-            d, P = damp(d, P, damping, tether, nu, nu, 0, 0)
+            d, P = damp(d, P, damping, chain, 0, 0)
     return d, P, fit
 
 
 @inline
-def back_through_epoch(first, last, lam, d, P, nu, H, damping, tether, gains):
+def back_through_epoch(first, last, lam, d, P, chain, damping):
     """Multiplier before an epoch's measurements from the one after them: gains are recomputed, in order, then undone."""
+    nu, H, gains = chain.nu, chain.H, chain.gains
     used = 0
     for c in range(first, last):
         if not isnan(nu[c]):
@@ -131,10 +136,10 @@ def back_through_epoch(first, last, lam, d, P, nu, H, damping, tether, gains):
                 d = d_next
                 P = P_next
     if damping > 0.0:
-        d, P = damp(d, P, damping, tether, nu, gains, used, 1)
+        d, P = damp(d, P, damping, chain, used, 1)
         for b in range(N):
             slot = used + N - 1 - b
-            h = sqrt(damping) * load_vector(tether, (N - 1 - b) * N, N)
+            h = sqrt(damping) * load_vector(chain.scaling, (N - 1 - b) * N, N)
             lam = lam - (gains[slot * (N + 1) + N] + load_vector(gains, slot * (N + 1), N) @ lam) * h
     for b in range(last - first):
         c = last - 1 - b
@@ -145,19 +150,17 @@ def back_through_epoch(first, last, lam, d, P, nu, H, damping, tether, gains):
 
 
 @inline
-def backward(a, W, first_row, Phi, nu, H, damping, tether, d_pred, P_pred, gains, multiplier, dx):
-    """Deviations of all states of the stretch, into `dx`; the multipliers of the dynamics, into `multiplier`."""
-    base = first_row[a]
+def backward(a, W, run, chain, damping):
+    """Deviations of all states of the stretch, and the multipliers of the dynamics."""
+    base = run.first_row[a]
     lam = unit(-1, N)
     for b in range(W):
         j = W - 1 - b
         k = a + j
         if b > 0:
-            lam = lam @ load_matrix(Phi, j * N * N, N, N)
-        d = load_vector(d_pred, j * N, N)
-        P = load_matrix(P_pred, j * N * N, N, N)
-        lam = back_through_epoch(
-            (first_row[k] - base) * M, (first_row[k + 1] - base) * M, lam, d, P, nu, H, damping, tether, gains
-        )
-        store(multiplier, j * N, lam)
-        store(dx, j * N, d - lam @ P)
+            lam = lam @ load_matrix(chain.Phi, j * N * N, N, N)
+        d = load_vector(chain.d_pred, j * N, N)
+        P = load_matrix(chain.P_pred, j * N * N, N, N)
+        lam = back_through_epoch((run.first_row[k] - base) * M, (run.first_row[k + 1] - base) * M, lam, d, P, chain, damping)
+        store(chain.multiplier, j * N, lam)
+        store(chain.dx, j * N, d - lam @ P)

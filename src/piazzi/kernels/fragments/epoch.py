@@ -4,35 +4,34 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def record(row, nu, H, P, R, at, innovation, innovation_covariance):
+def record(row, P, measured, own, innovations):
     """Write z - h and S = H P H^T + R of one row, NaN where a component is missing."""
+    at = measured.station[row] * M * M
     for i in range(M):
-        innovation[row * M + i] = nu[i]
-        Ph = load_vector(H, i * N, N) @ P
+        innovations.nu[row * M + i] = own.nu[i]
+        Ph = load_vector(own.H, i * N, N) @ P
         for j in range(M):
-            s = Ph @ load_vector(H, j * N, N) + R[at + i * M + j]
-            innovation_covariance[(row * M + i) * M + j] = nan if isnan(nu[i]) or isnan(nu[j]) else s
+            s = Ph @ load_vector(own.H, j * N, N) + measured.R[at + i * M + j]
+            innovations.S[(row * M + i) * M + j] = nan if isnan(own.nu[i]) or isnan(own.nu[j]) else s
 
 
 @inline
-def note_width(row, R, at, innovation_covariance, widest):
+def note_width(row, measured, innovations, widest):
     """Keep the largest predicted variance of a component that is there, in units of its noise."""
     for i in range(M):
-        s = innovation_covariance[(row * M + i) * M + i]
+        s = innovations.S[(row * M + i) * M + i]
         if not isnan(s):
-            widest[0] = maximum(widest[0], s / R[at + i * M + i])
+            widest[0] = maximum(widest[0], s / measured.R[(measured.station[row] * M + i) * M + i])
 
 
 @inline
-def update_epoch(
-    first, last, t, x, P, p, z, station, sensor, numbers, R, correlated, nu, H, work, innovation, innovation_covariance
-):
-    """All rows of one epoch, linearised once, at the predicted state: so they commute."""
+def update_epoch(run, k, x, P, p, measured, innovations):
+    """All rows of epoch k, linearised once, at the predicted state: so they commute."""
+    own = Row(scratch(M), scratch(MN), scratch(WORK))
     P_pred = P
     d = unit(-1, N)
-    for row in range(first, last):
-        s = station[row]
-        innovate(sensor[s], t, x, p, numbers, s * NUMBERS, z, row * M, nu, H, 0)
-        record(row, nu, H, P_pred, R, s * M * M, innovation, innovation_covariance)
-        d, P = absorb(d, P, nu, H, R, s * M * M, correlated[s], work)
+    for row in range(run.first_row[k], run.first_row[k + 1]):
+        innovate_row(measured, row, run.t[k], x, p, own.nu, own.H, 0)
+        record(row, P_pred, measured, own, innovations)
+        d, P = absorb(d, P, measured.station[row], measured, own)
     return x + d, P

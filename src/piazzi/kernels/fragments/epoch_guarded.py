@@ -4,18 +4,18 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def surprise(row, innovation, innovation_covariance, L):
+def squared_innovation(row, innovations, L):
     """nu^T S^-1 nu of a row over the components that are there, by Cholesky's factor, and how many these are."""
     total = 0.0
     present = 0
     for i in range(M):
-        e = innovation[row * M + i]
+        e = innovations.nu[row * M + i]
         if isnan(e):
             for j in range(M):
                 L[i * M + j] = 0.0
         else:
             for j in range(i + 1):
-                s = 0.0 if isnan(innovation[row * M + j]) else innovation_covariance[(row * M + i) * M + j]
+                s = 0.0 if isnan(innovations.nu[row * M + j]) else innovations.S[(row * M + i) * M + j]
                 for k in range(j):
                     s = s - L[i * M + k] * L[j * M + k]
                 if i == j:
@@ -32,60 +32,35 @@ def surprise(row, innovation, innovation_covariance, L):
 
 
 @inline
-def judge(
-    first, last, t, x, P, p, z, station, sensor, numbers, R, nu, H, work, gate, rejected, innovation, innovation_covariance
-):
+def judge(run, k, x, P, p, measured, gate, innovations):
     """Innovations of all rows at the prediction, and which rows lie beyond the gate of their number of components."""
-    for row in range(first, last):
-        s = station[row]
-        innovate(sensor[s], t, x, p, numbers, s * NUMBERS, z, row * M, nu, H, 0)
-        record(row, nu, H, P, R, s * M * M, innovation, innovation_covariance)
-        squared, present = surprise(row, innovation, innovation_covariance, work)
-        rejected[row] = 1 if squared > gate[present] else 0
+    own = Row(scratch(M), scratch(MN), scratch(WORK))
+    for row in range(run.first_row[k], run.first_row[k + 1]):
+        innovate_row(measured, row, run.t[k], x, p, own.nu, own.H, 0)
+        record(row, P, measured, own, innovations)
+        squared, present = squared_innovation(row, innovations, own.work)
+        gate.rejected[row] = 1 if squared > gate.limits[present] else 0
 
 
 @inline
-def update_epoch_guarded(
-    first,
-    last,
-    t,
-    x,
-    P,
-    p,
-    z,
-    station,
-    sensor,
-    numbers,
-    R,
-    correlated,
-    nu,
-    H,
-    work,
-    iterations,
-    gate,
-    rejected,
-    innovation,
-    innovation_covariance,
-):
+def update_epoch_guarded(run, k, x, P, p, measured, gate, innovations):
     """Gauss-Newton steps on prediction and measurements together: each counts once, however often it is linearised.
 
     Linearised at x + d, a row says nu + H d about the deviation from the prediction x (Bell and Cathey, IEEE Trans. Automatic
     Control 38, 1993); the covariance is that of the last step.
     """
-    judge(
-        first, last, t, x, P, p, z, station, sensor, numbers, R, nu, H, work, gate, rejected, innovation, innovation_covariance
-    )
+    judge(run, k, x, P, p, measured, gate, innovations)
+    own = Row(scratch(M), scratch(MN), scratch(WORK))
     d = unit(-1, N)
     P_new = P
-    for _ in range(iterations):
+    for _ in range(gate.iterations):
         offset = d
         d = unit(-1, N)
         P_new = P
-        for row in range(first, last):
-            if rejected[row] == 0:
-                s = station[row]
-                innovate(sensor[s], t, x + offset, p, numbers, s * NUMBERS, z, row * M, nu, H, 0)
+        for row in range(run.first_row[k], run.first_row[k + 1]):
+            if gate.rejected[row] == 0:
+                innovate_row(measured, row, run.t[k], x + offset, p, own.nu, own.H, 0)
                 for i in range(M):
-                    nu[i] = nu[i] + load_vector(H, i * N, N) @ offset
-                d, P_new = absorb(d, P_new, nu, H, R, s * M * M, correlated[s], work)
+                    own.nu[i] = own.nu[i] + load_vector(own.H, i * N, N) @ offset
+                d, P_new = absorb(d, P_new, measured.station[row], measured, own)
     return x + d, P_new

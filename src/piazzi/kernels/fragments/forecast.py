@@ -4,30 +4,17 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
-def run_forecast(
-    K: int,
-    t: Array,
-    t_start: float,
-    parts: Indices,
-    count: Indices,
-    scale: Array,
-    p: Array,
-    Q: Array,
-    x0: Array,
-    P0: Array,
-    mean: Array,
-    covariance: Array,
-) -> None:
-    x = load_vector(x0, 0, N)
-    P = load_matrix(P0, 0, N, N)
-    Q_unit = load_matrix(Q, 0, N, N)
-    before = t_start
-    for k in range(K):
-        if t[k] > before:
-            h = (t[k] - before) / parts[k]
+def run_forecast(run: Run, parts: Indices, p: Given, last: Belief, beliefs: Beliefs) -> None:
+    x = load_vector(last.mean, 0, N)
+    P = load_matrix(last.covariance, 0, N, N)
+    Q = load_matrix(run.Q, 0, N, N)
+    before = run.t_prior
+    for k in range(run.epochs):
+        if run.t[k] > before:
+            h = (run.t[k] - before) / parts[k]
             for i in range(parts[k]):
-                x, Phi, Q_step = advance(before + i * h, h, count[k], x, p, Q_unit, scale[k])
+                x, Phi, Q_step = advance(before + i * h, h, run.count[k], x, p, Q, run.scale[k])
                 P = symmetric(Phi @ P @ Phi.T + Q_step)
-        before = t[k]
-        store(mean, k * N, x)
-        store(covariance, k * N * N, P)
+        before = run.t[k]
+        store(beliefs.mean, k * N, x)
+        store(beliefs.covariance, k * N * N, P)

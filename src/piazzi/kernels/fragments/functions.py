@@ -4,25 +4,26 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
-def evaluate_measurement(K: int, sensor: int, t: Array, x: Array, p: Array, numbers: Array, out: Array) -> None:
+def evaluate_measurement(K: int, sensor: int, t: Array, x: Array, p: Given, numbers: Array, out: Array) -> None:
     for k in range(K):
         measure_into(sensor, t[k], load_vector(x, k * N, N), p, numbers, 0, out, k * M)
 
 
 @entry
-def evaluate_measurement_jacobian(
-    K: int, sensor: int, t: Array, x: Array, p: Array, numbers: Array, nu: Array, H: Array, out: Array
-) -> None:
+def evaluate_measurement_jacobian(K: int, sensor: int, t: Array, x: Array, p: Given, numbers: Array, out: Array) -> None:
+    z, nu, H = scratch(M), scratch(M), scratch(MN)
+    for i in range(M):
+        z[i] = 0.0
     for i in range(M * N):
         H[i] = 0.0
     for k in range(K):
-        innovate(sensor, t[k], load_vector(x, k * N, N), p, numbers, 0, nu, 0, nu, H, 0)
+        innovate(sensor, t[k], load_vector(x, k * N, N), p, numbers, 0, z, 0, nu, H, 0)
         for i in range(M):
             store(out, (k * M + i) * N, load_vector(H, i * N, N))
 
 
 @entry
-def evaluate_step(K: int, t: Array, dt: float, count: int, x: Array, p: Array, out: Array, Phi: Array) -> None:
+def evaluate_step(K: int, t: Array, dt: float, count: int, x: Array, p: Given, out: Array, Phi: Array) -> None:
     for k in range(K):
         x_next, derivative = transition(t[k], dt, count, load_vector(x, k * N, N), p)
         store(out, k * N, x_next)

@@ -4,111 +4,60 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
-def border_solve(
-    K: int,
-    C: int,
-    scale: Array,
-    first_row: Indices,
-    Q: Array,
-    Q_all: Array,
-    start: Array,
-    root: Array,
-    offset: Array,
-    sigma: Array,
-    defect: Array,
-    A: Array,
-    B: Array,
-    nu: Array,
-    H: Array,
-    G: Array,
-    damping: float,
-    tether: Array,
-    R: Array,
-    y: Array,
-    S: Array,
-    row: Array,
-    inverse: Array,
-    W: Array,
-    own: Array,
-    b: Array,
-    d_pred: Array,
-    P_pred: Array,
-    report: Array,
-) -> None:
-    size = N + C
-    begin_border(C, root, R, y, S)
+def border_solve(run: Run, start: Array, defect: Array, chain: Chain, border: Border, whole: Whole, damping: float) -> None:
+    C, size = border.constants, N + border.constants
+    begin_border(border)
     d = load_vector(start, 0, N)
-    P = 0.0 * Q_matrix(Q)
+    P = 0.0 * Q_matrix(run.Q)
     widest = 0.0
-    for k in range(K):
+    for k in range(run.epochs):
+        rows = range(run.first_row[k] * M, run.first_row[k + 1] * M)
         if k > 0:
-            F = load_matrix(A, (k - 1) * N * N, N, N)
-            P = symmetric(F @ P @ F.T + noise_at(k, scale[k], Q_matrix(Q), Q_all))
-            d = advance_border(k, C, F, d, load_vector(defect, k * N, N), B, offset, sigma, S)
-        invert_upper(R, inverse, size)
-        record_belief(k, C, d, P, offset, sigma, y, S, inverse, row, W, own, d_pred, P_pred)
-        for c in range(first_row[k] * M, first_row[k + 1] * M):
-            if not isnan(nu[c]):
-                width = width_of_row(load_vector(H, c * N, N), G, c * C, C, P, sigma, S, inverse, row, size)
+            F = load_matrix(border.A, (k - 1) * N * N, N, N)
+            P = symmetric(F @ P @ F.T + noise_at(k, run.scale[k], Q_matrix(run.Q), chain.Q_all))
+            d = advance_border(k, d, load_vector(defect, k * N, N), border)
+        invert_upper(border.R, border.inverse, size)
+        record_belief(k, d, P, border, whole)
+        for c in rows:
+            if not isnan(chain.nu[c]):
+                width = width_of_row(load_vector(chain.H, c * N, N), c * C, P, border)
                 widest = inf if isnan(width) else maximum(widest, width)
-        for c in range(first_row[k] * M, first_row[k + 1] * M):
-            if not isnan(nu[c]):
-                h = load_vector(H, c * N, N)
-                d, P = absorb_row(h, G, c * C, nu[c], C, d, P, offset, sigma, R, y, S, row, size)
+        for c in rows:
+            if not isnan(chain.nu[c]):
+                d, P = absorb_row(load_vector(chain.H, c * N, N), chain.nu[c], c * C, 1, d, P, border)
         if damping > 0.0:
             for i in range(N):
-                h = sqrt(damping) * load_vector(tether, i * N, N)
-                d, P = absorb_row(h, G, 0, 0.0, 0, d, P, offset, sigma, R, y, S, row, size)
+                d, P = absorb_row(sqrt(damping) * load_vector(chain.scaling, i * N, N), 0.0, 0, 0, d, P, border)
     if damping > 0.0:
         for i in range(C):
             for j in range(size):
-                row[j] = sqrt(damping) if j == N + i else 0.0
-            rotate(R, y, row, -sqrt(damping) * offset[i] / sigma[i] if sigma[i] > 0.0 else 0.0, size)
-    invert_upper(R, inverse, size)
+                border.row[j] = sqrt(damping) if j == N + i else 0.0
+            value = -sqrt(damping) * border.offset[i] / border.sigma[i] if border.sigma[i] > 0.0 else 0.0
+            rotate(border.R, border.y, border.row, value, size)
+    invert_upper(border.R, border.inverse, size)
     for i in range(size):
         s = 0.0
         for j in range(i, size):
-            s += inverse[i * size + j] * y[j]
-        b[i] = s
-    report[8] = widest
+            s += border.inverse[i * size + j] * border.y[j]
+        whole.unknowns[i] = s
+    whole.widest[0] = widest
 
 
 @entry
-def border_sensitivities(
-    K: int,
-    C: int,
-    scale: Array,
-    first_row: Indices,
-    Q: Array,
-    Q_all: Array,
-    root: Array,
-    sigma: Array,
-    A: Array,
-    B: Array,
-    nu: Array,
-    H: Array,
-    G: Array,
-    zero: Array,
-    f: Array,
-    change: Array,
-    tether: Array,
-    d_pred: Array,
-    P_pred: Array,
-    gains: Array,
-    multiplier: Array,
-    out: Array,
-) -> None:
+def border_sensitivities(run: Run, chain: Chain, border: Border, nu: Array, out: Array) -> None:
     """Derivative of every smoothed state by each unknown: the chain solved with that unknown as its only cause."""
-    none = load_vector(zero, 0, N)
-    P0 = 0.0 * Q_matrix(Q)
+    none = unit(-1, N)
+    C, sigma = border.constants, border.sigma
+    P0 = 0.0 * Q_matrix(run.Q)
     for j in range(N + C):
         c = j - N
-        for k in range(K):
-            store(f, k * N, sigma[c] * load_vector(B, (k * C + c) * N, N) if c >= 0 and k + 1 < K else none)
-            for i in range(first_row[k] * M, first_row[k + 1] * M):
-                change[i] = nan if isnan(nu[i]) else (-sigma[c] * G[i * C + c] if c >= 0 else 0.0)
-        first = load_vector(root, j * N, N) if c < 0 else none
-        forward(0, K, zero, scale, first_row, Q_matrix(Q), Q_all, f, A, change, H, first, P0, 0.0, tether, d_pred, P_pred)
-        backward(0, K, first_row, A, change, H, 0.0, tether, d_pred, P_pred, gains, multiplier, d_pred)
-        for i in range(K * N):
-            out[j * K * N + i] = d_pred[i]
+        for k in range(run.epochs):
+            moves = c >= 0 and k + 1 < run.epochs
+            store(chain.f, k * N, sigma[c] * load_vector(border.B, (k * C + c) * N, N) if moves else none)
+            for i in range(run.first_row[k] * M, run.first_row[k + 1] * M):
+                chain.nu[i] = nan if isnan(nu[i]) else (-sigma[c] * border.G[i * C + c] if c >= 0 else 0.0)
+        first = load_vector(border.root, j * N, N) if c < 0 else none
+        forward(0, run.epochs, run, chain, first, P0, 0.0)
+        backward(0, run.epochs, run, chain, 0.0)
+        for i in range(run.epochs * N):
+            out[j * run.epochs * N + i] = chain.dx[i]

@@ -4,9 +4,6 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
-def graph_weigh(
-    K: int, scale: Array, Q: Array, x: Array, f: Array, Q_all: Array, tether: Array, broken: Array, report: Array
-) -> None:
-    L, D, y = scratch(NN), scratch(N), scratch(N)
-    report[3] = 0.0
-    weigh_dynamics(K, scale, Q_matrix(Q), x, f, Q_all, tether, L, D, y, broken, report)
+def graph_weigh(run: Run, chain: Chain, broken: Array, report: Report) -> None:
+    report.defect[0] = 0.0
+    weigh_dynamics(run, chain, broken, report)

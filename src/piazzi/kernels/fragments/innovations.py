@@ -4,11 +4,11 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def record_epoch(k, t, first_row, z, station, sensor, numbers, R, p, x, d, P, nu, H, innovation, innovation_covariance):
+def record_epoch(k, run, p, measured, x, d, P, innovations):
     """z - h(x) - H d and H P H^T + R of all rows of epoch k, for predicted deviation d from x."""
-    for row in range(first_row[k], first_row[k + 1]):
-        s = station[row]
-        innovate(sensor[s], t[k], x, p, numbers, s * NUMBERS, z, row * M, nu, H, 0)
+    own = Row(scratch(M), scratch(MN), scratch(WORK))
+    for row in range(run.first_row[k], run.first_row[k + 1]):
+        innovate_row(measured, row, run.t[k], x, p, own.nu, own.H, 0)
         for i in range(M):
-            nu[i] = nu[i] - load_vector(H, i * N, N) @ d
-        record(row, nu, H, P, R, s * M * M, innovation, innovation_covariance)
+            own.nu[i] = own.nu[i] - load_vector(own.H, i * N, N) @ d
+        record(row, P, measured, own, innovations)

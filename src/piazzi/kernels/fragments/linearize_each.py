@@ -4,10 +4,11 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def linearize_dynamics(a, W, t, count, scale, p, Q, x, f, Phi, Q_all):
+def linearize_dynamics(a, W, run, chain, p):
     """f and Phi of states a ... a + W - 2 at their current values, stored from position 0."""
     for j in range(W - 1):
         k = a + j
-        y, Phi_k = transition(t[k], t[k + 1] - t[k], count[k + 1], load_vector(x, k * N, N), p)
-        store(f, j * N, y)
-        store(Phi, j * N * N, Phi_k)
+        x = load_vector(chain.x, k * N, N)
+        y, Phi = transition(run.t[k], run.t[k + 1] - run.t[k], run.count[k + 1], x, p)
+        store(chain.f, j * N, y)
+        store(chain.Phi, j * N * N, Phi)

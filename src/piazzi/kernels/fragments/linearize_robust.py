@@ -1,7 +1,6 @@
 """`linearize_rows` of `linearize`, with each row weighted as a loss wants.
 
-Work space `L` is longer than elsewhere: behind the M (M + N) numbers of a factorisation come the kind of the loss, the squares
-of its constant for rows of 0 ... M components, and the weight of every row.
+`chain.loss` is the kind of the loss, then the squares of its constant for rows of 0 ... M components.
 """
 
 from piazzi.kernels.vocabulary import *  # noqa: F403
@@ -20,44 +19,44 @@ def loss_weight(kind, square, s):
 
 
 @inline
-def whiten_row(row, out, k, t, state, z, station, sensor, numbers, R, correlated, p, nu, H, L):
+def whiten_row(row, out, t, x, p, measured, chain):
     """Innovation and Jacobian of one row in units of its noise, stored from position `out`."""
-    s = station[row]
-    innovate(sensor[s], t[k], state, p, numbers, s * NUMBERS, z, row * M, nu, H, out)
-    if correlated[s]:
-        decorrelate(nu, H, out, R, s * M * M, L)
+    s = measured.station[row]
+    nu, H = chain.nu, chain.H
+    innovate_row(measured, row, t, x, p, nu, H, out)
+    if measured.correlated[s]:
+        decorrelate(nu, H, out, measured.R, s * M * M, scratch(WORK))
     else:
         for i in range(M):
-            weight = 1.0 / sqrt(R[(s * M + i) * M + i])
+            weight = 1.0 / sqrt(measured.R[(s * M + i) * M + i])
             nu[out + i] = weight * nu[out + i]
             store(H, (out + i) * N, weight * load_vector(H, (out + i) * N, N))
 
 
 @inline
-def weigh_row(row, out, squared, present, nu, H, L):
+def weigh_row(row, out, squared, present, chain):
     """Scale a row by the root of the weight for a squared residual over that many components, and note the weight."""
-    at = M * (M + N)
-    weight = loss_weight(L[at], L[at + 1 + present], squared)
-    L[at + 2 + M + row] = weight
+    weight = loss_weight(chain.loss[0], chain.loss[1 + present], squared)
+    chain.weights[row] = weight
     root = sqrt(weight)
     for i in range(M):
-        nu[out + i] = root * nu[out + i]
-        store(H, (out + i) * N, root * load_vector(H, (out + i) * N, N))
+        chain.nu[out + i] = root * chain.nu[out + i]
+        store(chain.H, (out + i) * N, root * load_vector(chain.H, (out + i) * N, N))
 
 
 @inline
-def linearize_rows(a, W, t, x, first_row, z, station, sensor, numbers, R, correlated, p, nu, H, L):
+def linearize_rows(a, W, run, chain, p, measured):
     """Innovations and Jacobians of all rows of states a ... a + W - 1, whitened and weighted, stored from position 0."""
-    base = first_row[a]
+    base = run.first_row[a]
     for k in range(a, a + W):
-        state = load_vector(x, k * N, N)
-        for row in range(first_row[k], first_row[k + 1]):
+        state = load_vector(chain.x, k * N, N)
+        for row in range(run.first_row[k], run.first_row[k + 1]):
             out = (row - base) * M
-            whiten_row(row, out, k, t, state, z, station, sensor, numbers, R, correlated, p, nu, H, L)
+            whiten_row(row, out, run.t[k], state, p, measured, chain)
             squared = 0.0
             present = 0
             for i in range(M):
-                if not isnan(z[row * M + i]):
-                    squared += nu[out + i] * nu[out + i]
+                if not isnan(measured.z[row * M + i]):
+                    squared += chain.nu[out + i] * chain.nu[out + i]
                     present += 1
-            weigh_row(row, out, squared, present, nu, H, L)
+            weigh_row(row, out, squared, present, chain)

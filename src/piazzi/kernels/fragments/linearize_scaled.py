@@ -4,8 +4,9 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def linearize_dynamics(a, W, t, count, scale, p, Q, x, f, Phi, Q_all):
+def linearize_dynamics(a, W, run, chain, p):
     """f and Phi of states a ... a + W - 2 at their current values, stored from position 0."""
+    t, count = run.t, run.count
     j = 0
     while j + 1 < W:
         k = a + j
@@ -17,15 +18,15 @@ def linearize_dynamics(a, W, t, count, scale, p, Q, x, f, Phi, Q_all):
         if together:
             start = load_lanes(t, k, 1, 1, LANES)[0]
             h = (load_lanes(t, k + 1, 1, 1, LANES)[0] - start) / count[k + 1]
-            y, R = substep_jacobian(start, h, remember(load_lanes(x, k * N, N, N, LANES)), first_rows(), p)
+            y, R = substep_jacobian(start, h, remember(load_lanes(chain.x, k * N, N, N, LANES)), first_rows(), p)
             for i in range(1, count[k + 1]):
                 y, R = substep_jacobian(start + i * h, h, y, R, p)
             one = 1.0 + 0.0 * h  # in every lane: where nothing depends on the states, y and R have a single lane
-            store_lanes(f, j * N, N, one * y)
-            store_lanes(Phi, j * N * N, N * N, one * complete(R))
+            store_lanes(chain.f, j * N, N, one * y)
+            store_lanes(chain.Phi, j * N * N, N * N, one * complete(R))
             j += LANES
         else:
-            y_one, Phi_one = transition(t[k], t[k + 1] - t[k], count[k + 1], load_vector(x, k * N, N), p)
-            store(f, j * N, y_one)
-            store(Phi, j * N * N, Phi_one)
+            y_one, Phi_one = transition(t[k], t[k + 1] - t[k], count[k + 1], load_vector(chain.x, k * N, N), p)
+            store(chain.f, j * N, y_one)
+            store(chain.Phi, j * N * N, Phi_one)
             j += 1

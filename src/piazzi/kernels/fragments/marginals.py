@@ -28,11 +28,11 @@ def next_direction(rows, j):
 
 
 @inline
-def information_before(first, last, nu, H, Y):
+def information_before(first, last, chain, Y):
     """Information about a state with that of its own measurements added."""
     for c in range(first, last):
-        if not isnan(nu[c]):
-            h = load_vector(H, c * N, N)
+        if not isnan(chain.nu[c]):
+            h = load_vector(chain.H, c * N, N)
             Y = Y + outer(h, h)
     return Y
 
@@ -104,27 +104,27 @@ def inform_alone(information, from_here, own, own_at, covariance, at):
 
 
 @inline
-def marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P_last, keep_cross, covariance, cross):
+def marginal_covariances(a, W, run, chain, P_last, keep_cross, covariance, cross):
     """Covariance of each state a ... a + W - 1 into its place; of state k with state k + 1 into `cross` where wanted.
 
     Information is carried back from state to state, and kept where the covariance will be; what it does to the covariance of
     each state depends on no other state, so `LANES` of them are worked on together.  A state's own measurements are no part
     of it: a rough one beside precise ones of later states would be lost in the sum.
     """
-    base = first_row[a]
+    first_row, base, Q = run.first_row, run.first_row[a], Q_matrix(run.Q)
     rows, own, g, lost = scratch(NN_LANES), scratch(NN_LANES), scratch(NN), scratch(LANES)
     Y = 0.0 * P_last
     root_of(Q, g, 0)
     for b in range(1, W):
         j = W - 1 - b
         k = a + j
-        Y = information_before((first_row[k + 1] - base) * M, (first_row[k + 2] - base) * M, nu, H, Y)
-        amount = scale[k + 1]
+        Y = information_before((first_row[k + 1] - base) * M, (first_row[k + 2] - base) * M, chain, Y)
+        amount = run.scale[k + 1]
         if noise_varies():
-            root_of(noise_at(j + 1, amount, Q, Q_all), g, 0)
+            root_of(noise_at(j + 1, amount, Q, chain.Q_all), g, 0)
             amount = 1.0
         Y, T = forget(Y, identity(N), g, amount, keep_cross)
-        F = load_matrix(Phi, j * N * N, N, N)
+        F = load_matrix(chain.Phi, j * N * N, N, N)
         Y = symmetric(F.T @ Y @ F)
         store(covariance, k * N * N, Y)
         if keep_cross:
@@ -134,8 +134,8 @@ def marginal_covariances(a, W, scale, first_row, Q, Q_all, Phi, nu, H, P_pred, P
         together = LANES if j + LANES < W else 1
         for lane in range(together):
             first, last = first_row[a + j + lane], first_row[a + j + lane + 1]
-            P = load_matrix(P_pred, (j + lane) * N * N, N, N)
-            _, P, _ = absorb_epoch((first - base) * M, (last - base) * M, unit(-1, N), P, nu, H)
+            P = load_matrix(chain.P_pred, (j + lane) * N * N, N, N)
+            _, P, _ = absorb_epoch((first - base) * M, (last - base) * M, unit(-1, N), P, chain)
             store(own, lane * N * N, P)
         inform((a + j) * N * N, N * N if together > 1 else 0, own, covariance, rows, lost)
         j += together

@@ -4,14 +4,12 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def add_noise(Q_step, t, h, x, middle, y, G, Q, p):
+def add_noise(Q_step, h, x, middle, y, G, E, Q):
     """Process noise at the end of a substep from the one at its beginning.
 
     Simpson's rule in congruences, so that the result is semidefinite whatever the step: with G over the substep and E over
     its second half, Q' = G (Q' + h/6 Q) G^T + 4h/6 E Q E^T + h/6 Q, with Q in the axes of each of the three states.
     """
-    _, second = substep_jacobian(t + 0.5 * h, 0.5 * h, middle, identity_rows(), p)
-    E = complete(second)
     begin = Q_step + (h / 6.0) * noise_in_axes(Q, x)
     return G @ begin @ G.T + (h / 1.5) * (E @ noise_in_axes(Q, middle) @ E.T) + (h / 6.0) * noise_in_axes(Q, y)
 
@@ -28,6 +26,7 @@ def coast_noise(t, dt, count, x, R, p, Q, scale):
         y, first = substep_jacobian(at, h, x, identity_rows(), p)
         G = complete(first)
         Phi = G @ Phi
-        Q_step = add_noise(Q_step, at, h, x, middle, y, G, Q, p)
+        _, second = substep_jacobian(at + 0.5 * h, 0.5 * h, middle, identity_rows(), p)
+        Q_step = add_noise(Q_step, h, x, middle, y, G, complete(second), Q)
         x = y
     return x, Phi, symmetric(Q_step)

@@ -4,13 +4,13 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
-def evaluate_dynamics(K: int, t: Array, x: Array, p: Array, out: Array) -> None:
+def evaluate_dynamics(K: int, t: Array, x: Array, p: Given, out: Array) -> None:
     for k in range(K):
         store(out, k * N, dynamics(t[k], load_vector(x, k * N, N), p))
 
 
 @entry
-def evaluate_dynamics_jacobian(K: int, t: Array, x: Array, p: Array, out: Array) -> None:
+def evaluate_dynamics_jacobian(K: int, t: Array, x: Array, p: Given, out: Array) -> None:
     for k in range(K):
         _, F = rhs(t[k], load_vector(x, k * N, N), identity_rows(), p)
         store(out, k * N * N, F)

@@ -6,43 +6,46 @@ joint root B starts as the identity and takes in one component after the other (
 Trans. Automatic Control 16, 1971), all at the same predicted state: so rows of an epoch commute.
 """
 
-from piazzi.kernels.fragments.epoch_guarded import surprise
-from piazzi.kernels.fragments.root_linear import sense, unknowns
+from piazzi.kernels.fragments.root_linear import unknowns
 from piazzi.kernels.fragments.triangle import keep_root, triangularize_rows
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def begin_epoch(B, d):
+def begin_epoch(joint):
     """Nothing is measured yet: unit variances, and no correction."""
     for i in range(unknowns()):
-        d[i] = 0.0
+        joint.d[i] = 0.0
         for j in range(unknowns()):
-            B[i * unknowns() + j] = 1.0 if i == j else 0.0
+            joint.B[i * unknowns() + j] = 1.0 if i == j else 0.0
 
 
 @inline
-def record_root(row, nu, G, R, at, innovation, innovation_covariance):
+def record_root(row, measured, own, joint, innovations):
     """Write the innovation and S = G G^T + R of one row, NaN where a component is missing."""
+    at = measured.station[row] * M * M
+    nu, G = own.nu, joint.G
     for i in range(M):
-        innovation[row * M + i] = nu[i]
+        innovations.nu[row * M + i] = nu[i]
         for j in range(M):
-            s = R[at + i * M + j]
+            s = measured.R[at + i * M + j]
             for k in range(unknowns()):
                 s += G[i * unknowns() + k] * G[j * unknowns() + k]
-            innovation_covariance[(row * M + i) * M + j] = nan if isnan(nu[i]) or isnan(nu[j]) else s
+            innovations.S[(row * M + i) * M + j] = nan if isnan(nu[i]) or isnan(nu[j]) else s
 
 
 @inline
-def whiten_root(nu, G, R, at, L):
+def whiten_root(row, measured, own, joint):
     """Divide innovation and sensitivities of one row by the Cholesky factor of R, in place, without missing components."""
+    at = measured.station[row] * M * M
+    nu, L, G = own.nu, own.work, joint.G
     for i in range(M):
         if isnan(nu[i]):
             for j in range(M):
                 L[i * M + j] = 0.0
         else:
             for j in range(i + 1):
-                s = 0.0 if isnan(nu[j]) else R[at + i * M + j]
+                s = 0.0 if isnan(nu[j]) else measured.R[at + i * M + j]
                 for k in range(j):
                     s = s - L[i * M + k] * L[j * M + k]
                 if i == j:
@@ -60,14 +63,16 @@ def whiten_root(nu, G, R, at, L):
 
 
 @inline
-def absorb_root(nu, G, at, B, d, phi):
-    """Correction `d` and joint root `B` after one component of unit noise: B' = B - B phi phi^T / (S + sqrt(S)).
+def absorb_root(c, nu, joint):
+    """Correction and joint root after component c, of unit noise: B' = B - B phi phi^T / (S + sqrt(S)).
 
     Where the component is far more exact than what was known, the difference loses its digits: then one column of B after the
     other by rotations (Carlson, AIAA Journal 11, 1973).
     """
+    d, B, phi, G = joint.d, joint.B, joint.phi, joint.G
+    at = c * unknowns()
     S = 1.0
-    e = nu
+    e = nu[c]
     for j in range(unknowns()):
         e -= G[at + j] * d[j]
         s = 0.0
@@ -96,53 +101,24 @@ def absorb_root(nu, G, at, B, d, phi):
 
 
 @inline
-def take_row(
-    row,
-    s,
-    t,
-    x,
-    U,
-    p,
-    z,
-    sensor,
-    numbers,
-    R,
-    nu,
-    H,
-    work,
-    settings,
-    gate,
-    G,
-    B,
-    d,
-    phi,
-    seen,
-    rejected,
-    innovation,
-    innovation_covariance,
-):
-    """One row of measurements into the epoch's correction, unless it lies beyond the gate of its number of components."""
-    sense(s, t, x, U, p, z, row, sensor, numbers, nu, H, G, seen, settings)
-    record_root(row, nu, G, R, s * M * M, innovation, innovation_covariance)
-    squared, present = surprise(row, innovation, innovation_covariance, work)
-    rejected[row] = 1 if squared > gate[present] else 0
-    if rejected[row] == 0:
-        whiten_root(nu, G, R, s * M * M, work)
-        for c in range(M):
-            if not isnan(nu[c]):
-                absorb_root(nu[c], G, c * unknowns(), B, d, phi)
+def take_row(row, measured, own, joint):
+    """One row of measurements, as it was sensed, into the epoch's correction."""
+    whiten_root(row, measured, own, joint)
+    for c in range(M):
+        if not isnan(own.nu[c]):
+            absorb_root(c, own.nu, joint)
 
 
 @inline
-def finish_epoch(x, U, B, d, rows):
+def finish_epoch(x, root, joint):
     """The state with its correction; its root, in place."""
     for c in range(unknowns()):
         row = unit(-1, N)
         for i in range(N):
-            row = row + B[i * unknowns() + c] * load_vector(U, i * N, N)
-        store(rows, c * N, row)
+            row = row + joint.B[i * unknowns() + c] * load_vector(root.U, i * N, N)
+        store(root.rows, c * N, row)
     for i in range(N):
-        x = x + d[i] * load_vector(U, i * N, N)
-    triangularize_rows(rows, unknowns())
-    keep_root(rows, U)
+        x = x + joint.d[i] * load_vector(root.U, i * N, N)
+    triangularize_rows(root.rows, unknowns())
+    keep_root(root.rows, root.U)
     return x

@@ -12,21 +12,21 @@ def unknowns():
 
 
 @inline
-def advance_root(t, dt, count, x, U, p, Q, scale, points, rows, settings):
-    """The next state; its root, in place: of Phi P Phi^T + Q."""
-    x, Phi, Q_step = advance(t, dt, count, x, p, Q, scale)
+def advance_root(run, k, before, x, p, Q, root):
+    """The state at epoch k; its root, in place: of Phi P Phi^T + Q."""
+    x, Phi, Q_step = advance(before, run.t[k] - before, run.count[k], x, p, Q, run.scale[k])
     for i in range(N):
-        store(rows, i * N, Phi @ load_vector(U, i * N, N))
-    root_of(Q_step, rows, N * N)
-    triangularize_rows(rows, 2 * N)
-    keep_root(rows, U)
+        store(root.rows, i * N, Phi @ load_vector(root.U, i * N, N))
+    root_of(Q_step, root.rows, N * N)
+    triangularize_rows(root.rows, 2 * N)
+    keep_root(root.rows, root.U)
     return x
 
 
 @inline
-def sense(s, t, x, U, p, z, row, sensor, numbers, nu, H, G, seen, settings):
-    """Innovation `nu` of a row, and how it depends on the unknowns, H r_i, into the rows of `G`."""
-    innovate(sensor[s], t, x, p, numbers, s * NUMBERS, z, row * M, nu, H, 0)
+def sense(measured, row, t, x, p, root, own, joint):
+    """Innovation of a row, and how it depends on the unknowns, H r_i, into the rows of `joint.G`."""
+    innovate_row(measured, row, t, x, p, own.nu, own.H, 0)
     for c in range(M):
         for i in range(N):
-            G[c * N + i] = load_vector(H, c * N, N) @ load_vector(U, i * N, N)
+            joint.G[c * N + i] = load_vector(own.H, c * N, N) @ load_vector(root.U, i * N, N)

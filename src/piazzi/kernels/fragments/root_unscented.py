@@ -22,26 +22,28 @@ def unknowns():
 
 
 @inline
-def carry_points(t, dt, count, x, U, p, eta, points):
-    """The sigma points around `x` after `dt` seconds, `LANES` at a time: x + eta r_i, then x - eta r_i."""
+def carry_points(run, k, before, x, p, root):
+    """The sigma points around `x` at epoch k, `LANES` at a time: x + eta r_i, then x - eta r_i."""
+    points = root.points
     for i in range(N):
-        step = eta * load_vector(U, i * N, N)
+        step = root.eta * load_vector(root.U, i * N, N)
         store(points, i * N, x + step)
         store(points, (N + i) * N, x - step)
     groups = (2 * N + LANES - 1) // LANES
     for i in range(2 * N, groups * LANES):
         store(points, i * N, x)
+    dt, count = run.t[k] - before, run.count[k]
     for g in range(groups):
         at = g * LANES * N
-        store_lanes(points, at, N, travel(t, dt, count, load_lanes(points, at, N, N, LANES), p))
+        store_lanes(points, at, N, travel(before, dt, count, load_lanes(points, at, N, N, LANES), p))
 
 
 @inline
-def advance_root(t, dt, count, x, U, p, Q, scale, points, rows, settings):
-    """The next mean; its root, in place, with the process noise along the central point."""
-    eta = settings[0]
-    centre, _, Q_step = advance(t, dt, count, x, p, Q, scale)
-    carry_points(t, dt, count, x, U, p, eta, points)
+def advance_root(run, k, before, x, p, Q, root):
+    """The mean at epoch k; its root, in place, with the process noise along the central point."""
+    eta, points, rows = root.eta, root.points, root.rows
+    centre, _, Q_step = advance(before, run.t[k] - before, run.count[k], x, p, Q, run.scale[k])
+    carry_points(run, k, before, x, p, root)
     total = unit(-1, N)
     for i in range(N):
         plus = load_vector(points, i * N, N) - centre
@@ -51,30 +53,30 @@ def advance_root(t, dt, count, x, U, p, Q, scale, points, rows, settings):
         store(rows, (N + i) * N, even)
         total = total + even
     for i in range(N, 2 * N):
-        store(rows, i * N, load_vector(rows, i * N, N) + settings[1] * total)
+        store(rows, i * N, fused(root.share, total, load_vector(rows, i * N, N)))
     root_of(Q_step, rows, 2 * N * N)
     triangularize_rows(rows, 3 * N)
-    keep_root(rows, U)
+    keep_root(rows, root.U)
     return centre + (1.0 / eta) * total
 
 
 @inline
-def difference(s, t, x, p, sensor, numbers, nu, H, seen):
-    """h(x) less the central point's in `seen`, angles wrapped, into `nu` with the sign turned."""
-    innovate(sensor[s], t, x, p, numbers, s * NUMBERS, seen, 0, nu, H, 0)
+def innovate_from(z, s, t, x, p, measured, own):
+    """`z` less h(x) of station s, angles wrapped, into `own.nu`."""
+    innovate(measured.sensor[s], t, x, p, measured.numbers, s * NUMBERS, z, 0, own.nu, own.H, 0)
 
 
 @inline
-def sense(s, t, x, U, p, z, row, sensor, numbers, nu, H, G, seen, settings):
-    """Innovation `nu` of a row, and how it depends on the unknowns, o_i and s_i + c sum of s_j, into the rows of `G`."""
-    eta = settings[0]
-    measure_into(sensor[s], t, x, p, numbers, s * NUMBERS, seen, 0)
+def sense(measured, row, t, x, p, root, own, joint):
+    """Innovation of a row, and how it depends on the unknowns, o_i and s_i + c sum of s_j, into the rows of `joint.G`."""
+    eta, nu, G, s = root.eta, own.nu, joint.G, measured.station[row]
+    measure_row(measured, row, t, x, p, joint.centre, 0)
     for i in range(N):
-        step = eta * load_vector(U, i * N, N)
-        difference(s, t, x + step, p, sensor, numbers, nu, H, seen)
+        step = eta * load_vector(root.U, i * N, N)
+        innovate_from(joint.centre, s, t, x + step, p, measured, own)
         for c in range(M):
             G[c * 2 * N + i] = -nu[c]
-        difference(s, t, x - step, p, sensor, numbers, nu, H, seen)
+        innovate_from(joint.centre, s, t, x - step, p, measured, own)
         for c in range(M):
             plus = G[c * 2 * N + i]
             G[c * 2 * N + i] = (0.5 / eta) * (plus + nu[c])
@@ -84,8 +86,8 @@ def sense(s, t, x, U, p, z, row, sensor, numbers, nu, H, G, seen, settings):
         for i in range(N):
             total += G[c * 2 * N + N + i]
         for i in range(N):
-            G[c * 2 * N + N + i] += settings[1] * total
-        seen[M + c] = z[row * M + c] - total / eta
-    innovate(sensor[s], t, x, p, numbers, s * NUMBERS, seen, M, nu, H, 0)
+            G[c * 2 * N + N + i] = fused(root.share, total, G[c * 2 * N + N + i])
+        joint.shifted[c] = measured.z[row * M + c] - total / eta
+    innovate_from(joint.shifted, s, t, x, p, measured, own)
     for c in range(M):
-        nu[c] = unless_missing(z[row * M + c], nu[c])
+        nu[c] = unless_missing(measured.z[row * M + c], nu[c])

@@ -22,37 +22,19 @@ def factor_in_place(L):
 
 
 @entry
-def run_simulation(
-    K: int,
-    t: Array,
-    t_prior: float,
-    count: Indices,
-    scale: Array,
-    first_row: Indices,
-    station: Indices,
-    sensor: Indices,
-    numbers: Array,
-    p: Array,
-    Q: Array,
-    x0: Array,
-    w: Array,
-    L: Array,
-    truth: Array,
-    z: Array,
-) -> None:
-    x = load_vector(x0, 0, N)
-    Q_unit = load_matrix(Q, 0, N, N)
-    before = t_prior
-    for k in range(K):
-        if t[k] > before:
+def run_simulation(run: Run, p: Given, measured: Measured, first: Array, w: Array, L: Array, truth: Array) -> None:
+    x = load_vector(first, 0, N)
+    Q = load_matrix(run.Q, 0, N, N)
+    before = run.t_prior
+    for k in range(run.epochs):
+        if run.t[k] > before:
             start = x
-            x = travel(before, t[k] - before, count[k], start, p)
-            _, _, Q_step = advance(before, t[k] - before, count[k], start, p, Q_unit, scale[k])
+            x = travel(before, run.t[k] - before, run.count[k], start, p)
+            _, _, Q_step = advance(before, run.t[k] - before, run.count[k], start, p, Q, run.scale[k])
             store(L, 0, Q_step)
             factor_in_place(L)
             x = x + load_matrix(L, 0, N, N) @ load_vector(w, k * N, N)
-        before = t[k]
+        before = run.t[k]
         store(truth, k * N, x)
-        for row in range(first_row[k], first_row[k + 1]):
-            s = station[row]
-            measure_into(sensor[s], t[k], x, p, numbers, s * NUMBERS, z, row * M)
+        for row in range(run.first_row[k], run.first_row[k + 1]):
+            measure_row(measured, row, run.t[k], x, p, measured.z, row * M)

@@ -4,52 +4,32 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
-def run_step_error(
-    K: int,
-    t: Array,
-    t_prior: float,
-    count: Indices,
-    finer: Indices,
-    scale: Array,
-    first_row: Indices,
-    z: Array,
-    station: Indices,
-    sensor: Indices,
-    numbers: Array,
-    R: Array,
-    correlated: Indices,
-    p: Array,
-    Q: Array,
-    x0: Array,
-    P0: Array,
-    bias_out: Array,
-    covariance_out: Array,
-) -> None:
-    nu, H, work = scratch(M), scratch(MN), scratch(WORK)
-    x = load_vector(x0, 0, N)
-    P = load_matrix(P0, 0, N, N)
-    Q_unit = load_matrix(Q, 0, N, N)
+def run_step_error(run: Run, finer: Indices, p: Given, measured: Measured, prior: Belief, beliefs: Beliefs) -> None:
+    own = Row(scratch(M), scratch(MN), scratch(WORK))
+    x = load_vector(prior.mean, 0, N)
+    P = load_matrix(prior.covariance, 0, N, N)
+    Q = load_matrix(run.Q, 0, N, N)
     bias = unit(-1, N)
-    before = t_prior
-    for k in range(K):
-        if t[k] > before:
-            dt = t[k] - before
+    before = run.t_prior
+    for k in range(run.epochs):
+        if run.t[k] > before:
+            dt = run.t[k] - before
             exact = travel(before, dt, finer[k], x, p)
-            x, Phi, Q_step = advance(before, dt, count[k], x, p, Q_unit, scale[k])
+            x, Phi, Q_step = advance(before, dt, run.count[k], x, p, Q, run.scale[k])
             bias = Phi @ bias + (x - exact)
             P = Phi @ P @ Phi.T + Q_step
-        before = t[k]
+        before = run.t[k]
         d = unit(-1, N)
         P_new = P
-        for row in range(first_row[k], first_row[k + 1]):
-            s = station[row]
-            innovate(sensor[s], t[k], x, p, numbers, s * NUMBERS, z, row * M, nu, H, 0)
+        for row in range(run.first_row[k], run.first_row[k + 1]):
+            s = measured.station[row]
+            innovate_row(measured, row, run.t[k], x, p, own.nu, own.H, 0)
             for i in range(M):
-                nu[i] = nan if isnan(nu[i]) else 0.0
-            bias, _ = absorb(bias, P_new, nu, H, R, s * M * M, correlated[s], work)
-            innovate(sensor[s], t[k], x, p, numbers, s * NUMBERS, z, row * M, nu, H, 0)
-            d, P_new = absorb(d, P_new, nu, H, R, s * M * M, correlated[s], work)
+                own.nu[i] = nan if isnan(own.nu[i]) else 0.0
+            bias, _ = absorb(bias, P_new, s, measured, own)
+            innovate_row(measured, row, run.t[k], x, p, own.nu, own.H, 0)
+            d, P_new = absorb(d, P_new, s, measured, own)
         x = x + d
         P = symmetric(P_new)
-        store(bias_out, k * N, bias)
-        store(covariance_out, k * N * N, P)
+        store(beliefs.mean, k * N, bias)
+        store(beliefs.covariance, k * N * N, P)

@@ -1,6 +1,6 @@
 """From one epoch to the next through manoeuvres: at each, the state jumps.
 
-The manoeuvres follow the parameters in `p`: how many there are, then for each its time, the jump (N) and its covariance (N, N).
+`p.manoeuvres` says how many there are, then for each its time, the jump (N) and its covariance (N, N).
 One at the time of an epoch belongs to the interval that ends there.  Times that differ by 1e-12 of themselves, or by as many
 seconds, are one: sums of intervals are rounded.  What decides is a property of the manoeuvre alone, so that the intervals on
 both sides of an epoch agree whose it is.
@@ -11,8 +11,8 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 @inline
 def manoeuvre(i):
-    """Position in `p` of manoeuvre `i`."""
-    return GIVEN + 1 + i * (1 + N + N * N)
+    """Where manoeuvre `i` begins."""
+    return 1 + i * (1 + N + N * N)
 
 
 @inline
@@ -33,11 +33,11 @@ def travel(t, dt, count, x, p):
     """The state `dt` seconds later."""
     x = remember(x)
     done = 0.0
-    for i in range(int(p[GIVEN])):
+    for i in range(int(p.manoeuvres[0])):
         at = manoeuvre(i)
-        if happens(p[at], t, dt):
-            part = minimum(p[at] - t, dt) - done
-            x = coast(t + done, part, share(count, part, dt), x, p) + load_vector(p, at + 1, N)
+        if happens(p.manoeuvres[at], t, dt):
+            part = minimum(p.manoeuvres[at] - t, dt) - done
+            x = coast(t + done, part, share(count, part, dt), x, p) + load_vector(p.manoeuvres, at + 1, N)
             done += part
     return coast(t + done, dt - done, share(count, dt - done, dt), x, p)
 
@@ -47,12 +47,12 @@ def transition(t, dt, count, x, p):
     """The state `dt` seconds later, and its derivative with respect to the state now."""
     x, R = remember(x), first_rows()
     done = 0.0
-    for i in range(int(p[GIVEN])):
+    for i in range(int(p.manoeuvres[0])):
         at = manoeuvre(i)
-        if happens(p[at], t, dt):
-            part = minimum(p[at] - t, dt) - done
+        if happens(p.manoeuvres[at], t, dt):
+            part = minimum(p.manoeuvres[at] - t, dt) - done
             x, R = coast_jacobian(t + done, part, share(count, part, dt), x, R, p)
-            x = x + load_vector(p, at + 1, N)
+            x = x + load_vector(p.manoeuvres, at + 1, N)
             done += part
     x, R = coast_jacobian(t + done, dt - done, share(count, dt - done, dt), x, R, p)
     return x, complete(R)

@@ -4,25 +4,12 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
-def update_once(
-    s: int,
-    t: float,
-    z: Array,
-    sensor: Indices,
-    numbers: Array,
-    R: Array,
-    correlated: Indices,
-    p: Array,
-    mean: Array,
-    covariance: Array,
-    innovation: Array,
-    innovation_covariance: Array,
-) -> None:
-    nu, H, work = scratch(M), scratch(MN), scratch(WORK)
-    x = load_vector(mean, 0, N)
-    P = load_matrix(covariance, 0, N, N)
-    innovate(sensor[s], t, x, p, numbers, s * NUMBERS, z, 0, nu, H, 0)
-    record(0, nu, H, P, R, s * M * M, innovation, innovation_covariance)
-    d, P_new = absorb(unit(-1, N), P, nu, H, R, s * M * M, correlated[s], work)
-    store(mean, 0, x + d)
-    store(covariance, 0, symmetric(P_new))
+def update_once(t: float, p: Given, measured: Measured, belief: Belief, innovations: Innovations) -> None:
+    own = Row(scratch(M), scratch(MN), scratch(WORK))
+    x = load_vector(belief.mean, 0, N)
+    P = load_matrix(belief.covariance, 0, N, N)
+    innovate_row(measured, 0, t, x, p, own.nu, own.H, 0)
+    record(0, P, measured, own, innovations)
+    d, P_new = absorb(unit(-1, N), P, measured.station[0], measured, own)
+    store(belief.mean, 0, x + d)
+    store(belief.covariance, 0, symmetric(P_new))

@@ -4,16 +4,18 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def absorb(d, P, nu, H, R, at, correlated, work):
-    """Correction `d` of the predicted state and covariance after one row of measurements, linearised where `nu`, `H` were.
+def absorb(d, P, s, measured, own):
+    """Correction `d` of the predicted state and covariance after one row of station s, linearised where `own` was.
 
     Joseph form for a scalar: with B = P (I - K H)^T, P' = (I - K H) B + K r K^T = B + K (r K - H B)^T.
     """
+    at, correlated = s * M * M, measured.correlated[s]
+    nu, H = own.nu, own.H
     if correlated:
-        decorrelate(nu, H, 0, R, at, work)
+        decorrelate(nu, H, 0, measured.R, at, own.work)
     for i in range(M):
         if not isnan(nu[i]):
-            r = 1.0 if correlated else R[at + i * M + i]
+            r = 1.0 if correlated else measured.R[at + i * M + i]
             h = load_vector(H, i * N, N)
             Ph = h @ P
             S = h @ Ph + r

@@ -12,22 +12,24 @@ def noise(nu, R, at, i, j):
 
 
 @inline
-def absorb(d, P, nu, H, R, at, correlated, work):
-    """Correction `d` of the predicted state and covariance after one row of measurements, linearised where `nu`, `H` were.
+def absorb(d, P, s, measured, own):
+    """Correction `d` of the predicted state and covariance after one row of station s, linearised where `own` was.
 
     Gain by a Cholesky solve, S = L L^T; `work` holds L, then the rows of K^T.  Joseph form, row by row:
     with B = P (I - K H)^T, P' = B + sum_i K_i (sum_j R_ij K_j - H_i B)^T.
     """
+    at, R = s * M * M, measured.R
+    nu, H, work = own.nu, own.H, own.work
     for i in range(M):
         if isnan(nu[i]):
             store(H, i * N, unit(-1, N))
     for i in range(M):
         Ph = load_vector(H, i * N, N) @ P
         for j in range(i + 1):
-            s = Ph @ load_vector(H, j * N, N) + noise(nu, R, at, i, j)
+            S = Ph @ load_vector(H, j * N, N) + noise(nu, R, at, i, j)
             for k in range(j):
-                s = s - work[i * M + k] * work[j * M + k]
-            work[i * M + j] = sqrt(s) if i == j else s / work[j * M + j]
+                S = S - work[i * M + k] * work[j * M + k]
+            work[i * M + j] = sqrt(S) if i == j else S / work[j * M + j]
         for k in range(i):
             Ph = Ph - work[i * M + k] * load_vector(work, M * M + k * N, N)
         store(work, M * M + i * N, (1.0 / work[i * M + i]) * Ph)
