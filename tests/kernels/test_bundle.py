@@ -10,9 +10,9 @@ from numpy.testing import assert_array_equal
 
 import piazzi as pz
 from piazzi import kernels
-from piazzi.kernels.bundle import Belief, Beliefs, Gate, Innovations, Measured, Run
+from piazzi.kernels.bundle import Belief, Beliefs, Gate, Given, Innovations, Measured, Run
 from piazzi.kernels.entries import definitions, flat, opened, signatures
-from piazzi.kernels.members import BUNDLES
+from piazzi.kernels.members import BUNDLES, MOST_KINDS
 from piazzi.problem.inputs import prepare
 
 FRAGMENTS = sorted((Path(kernels.__file__).parent / "fragments").glob("*.py"))
@@ -53,7 +53,9 @@ WRONG = {
     "half an epoch": (lambda: run(epochs=2.5), TypeError, "Run.epochs must be one whole number"),
     "a flat matrix": (lambda: run(Q=np.zeros(4)), TypeError, r"Run.Q has shape \(4,\); it must have 2 axes"),
     "a matrix that is not square": (lambda: run(Q=np.zeros((2, 3))), ValueError, r"Run.Q has shape \(2, 3\), but N is 2"),
-    "too few times": (lambda: run(t=np.zeros(2)), ValueError, r"Run.count has shape \(3,\), but K is 2"),
+    "too few times": (lambda: run(t=np.zeros(2)), ValueError, r"Run.t has shape \(2,\), but K is 3"),
+    "more epochs than times": (lambda: run(epochs=4), ValueError, r"Run.t has shape \(3,\), but K is 4"),
+    "text for a number": (lambda: run(t_prior="noon"), TypeError, "Run.t_prior must be one number, not 'noon'"),
     "one row too few": (lambda: run(first_row=np.arange(3)), ValueError, r"Run.first_row has shape \(3,\), but K is 3"),
 }
 
@@ -116,13 +118,58 @@ def test_kernels_refuse_calls_that_do_not_fit(name, jit, case, monkeypatch):
 
 
 def test_also_after_a_call_that_did(case):
-    """What was checked once is remembered by what it was."""
+    """What was checked once is remembered by what stood in each place."""
     entry = kernels.load(case[2]).run_filter
     good = arguments(case)
     entry(*good)
     entry(*good)
     with pytest.raises(ValueError, match="K is 99 in Beliefs"):
         entry(*good[:4], Beliefs.empty(K=99, N=4), good[5])
+    problem, n = case[0], case[0].model.n
+    entry = kernels.load(problem.spec("transition", "rates")).evaluate_dynamics
+    good = [2, np.zeros(2), np.ones((2, n)), problem.given_bundle, np.empty((2, n))]
+    entry(*good)
+    with pytest.raises(TypeError, match="argument 3 of kernel evaluate_dynamics must be a Given, not ndarray"):
+        entry(*good[:3], good[4], good[3])
+    with pytest.raises(TypeError, match="argument 0 of kernel evaluate_dynamics must be one whole number"):
+        entry(good[1], good[0], *good[2:])
+
+
+def test_what_a_model_is_told_has_its_size(case):
+    problem = case[0]
+    entry = kernels.load(problem.spec("transition", "rates")).evaluate_dynamics
+    x = np.ones((1, problem.model.n))
+    with pytest.raises(ValueError, match="kernel evaluate_dynamics: P is 7 in Given"):
+        entry(1, np.zeros(1), x, Given(parameters=np.zeros(7), manoeuvres=np.zeros(1)), np.empty_like(x))
+
+
+def test_what_is_remembered_does_not_grow():
+    for K in range(MOST_KINDS + 10):
+        Beliefs.empty(K=K, N=1)
+        Belief(mean=np.zeros(K % 600), covariance=np.empty((K % 600, K % 600)))
+    for kind in (Belief, Beliefs):
+        assert max(len(kind._known), len(kind._plans), len(kind._kinds)) <= MOST_KINDS
+
+
+def test_a_fragment_is_lent_for_a_block():
+    """Another text under the same name is another kernel; none may stand in the place of one that there is."""
+    problem, _ = pz.load("b612-range")
+    text = "from piazzi.kernels.vocabulary import *\n\n@entry\ndef run_once(out: Array) -> None:\n    out[0] = {}\n"
+    for value in ("1.0", "2.0"):
+        out = np.zeros(1)
+        with pytest.MonkeyPatch.context() as patch, kernels.fragment("tried", text.format(value)):
+            patch.setenv("PIAZZI_JIT", "0")
+            kernels.load(problem.spec("transition", "tried")).run_once(out)
+        assert out == float(value)
+    with pytest.raises(ValueError, match="there is a kernel fragment 'filter' already"), kernels.fragment("filter", text):
+        pass
+
+
+def test_a_bundle_within_an_entry_is_none_of_its_arguments():
+    text = "@entry\ndef go(nu: Array, k: int) -> None:\n    own = Row(nu, scratch(MN), scratch(WORK))\n    own.nu[k] = 1.0\n"
+    assert signatures(opened(text)) == {"go": ("floats", "integer")}
+    with pytest.raises(ValueError, match="kernel entry 'go' does not say what 'k' is"):
+        opened("@entry\ndef go(k):\n    pass\n")
 
 
 def test_arrays_by_themselves_are_checked_at_every_call(case):

@@ -33,6 +33,9 @@ class _Epoch:
         return Run(epochs=1, first_row=self._first_row, Q=self._Q, **times)
 
 
+KEPT = 16  # rows of epochs whose arrays are used again
+
+
 class LiveRootFilter(Session):
     """An unscented or square-root filter in progress, from its ``start(problem)``.
 
@@ -109,9 +112,9 @@ class LiveRootFilter(Session):
         """The epoch at `time`, with the rows that it has so far, from the belief before it."""
         assert self.time is not None
         t, rows = self.time, len(self._values)
-        if rows not in self._epochs:
-            self._epochs[rows] = _Epoch(self._kernel, rows)
-        epoch, dt = self._epochs[rows], self._clock.interval(t)
+        epoch, dt = self._epochs.get(rows) or _Epoch(self._kernel, rows), self._clock.interval(t)
+        if rows <= KEPT:
+            self._epochs[rows] = epoch
         epoch.t[0] = t
         epoch.count[0], epoch.scale[0] = self._clock.step(dt) if dt > 0 else (1, 0.0)
         epoch.measured.z[:], epoch.measured.station[:] = self._values, self._rows_of

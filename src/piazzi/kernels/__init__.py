@@ -1,6 +1,6 @@
 """Equations become compiled code."""
 
-from piazzi.kernels.cache import build_seconds, is_compiled, load
+from piazzi.kernels.cache import build_seconds, fragment, is_compiled, load
 from piazzi.kernels.integrators import ConstantAcceleration, Discrete, DormandPrince, Integrator, Kepler, Taylor
 from piazzi.kernels.runge_kutta import (
     DormandPrince5,
@@ -13,7 +13,7 @@ from piazzi.kernels.runge_kutta import (
     RungeKutta4,
     RungeKutta8,
 )
-from piazzi.kernels.spec import KernelSpec, fragment
+from piazzi.kernels.spec import KernelSpec
 
 __all__ = [
     "ConstantAcceleration",

@@ -1,8 +1,8 @@
 """The arrays of a run in named bundles: Python makes them by name, kernels read their members, and a call is checked once.
 
-A bundle lists its members with their sizes: `float` and `int` for one number; names of sizes for an array of float64
-(``"K N N"``, K matrices of N rows), after ``int64`` one of integers; ``K+1`` is one more than K, and ``*`` any size.  An entry
-of a kernel takes bundles; its object code takes their members, one pointer each (`entries.opened`).
+A bundle lists its members with their sizes: `float` and `int` for one number, ``"int K"`` for one that is K; names of sizes for
+an array of float64 (``"K N N"``, K matrices of N rows), after ``int64`` one of integers; ``K+1`` is one more than K, ``*`` any
+size.  An entry of a kernel takes bundles; its object code takes their members, one pointer each (`entries.opened`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from piazzi.kernels.members import Bundle
 
 class Run(
     Bundle,
-    epochs="int",
+    epochs="int K",
     t_prior="float",
     t="K",
     count="int64 K",
@@ -182,7 +182,7 @@ class Drawn(Bundle, first="runs N", w="runs K N", v="runs J M", Q_root="N N", R_
     """First states of runs, standard normal numbers, and roots of the noises that these become."""
 
 
-class Samples(Bundle, many="int", rows="int", truth="runs K N", z="runs J M"):
+class Samples(Bundle, many="int runs", rows="int J", truth="runs K N", z="runs J M"):
     """How many runs there are, rows of measurements in each; their true states and measurements."""
 
 
@@ -192,7 +192,7 @@ class Ends(Bundle, mean="runs N", covariance="runs N N"):
 
 class Accuracy(
     Bundle,
-    groups="int",
+    groups="int G",
     member="int64 G N",
     squared="runs G K",
     spread="runs G K",

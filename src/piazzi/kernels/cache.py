@@ -10,7 +10,7 @@ import os
 import threading
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -18,8 +18,9 @@ from typing import Any
 from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, live_entries, plain_entries, tell_of_source
 from piazzi.kernels.folder import Folder, private_folder, writable_folder
 from piazzi.kernels.library import load_objects
+from piazzi.kernels.names import FRAGMENTS
 from piazzi.kernels.settings import may_be_kept
-from piazzi.kernels.spec import KernelSpec
+from piazzi.kernels.spec import KernelSpec, tried
 
 LOGGER = logging.getLogger("piazzi.kernels")
 MANIFEST = "manifest.json"
@@ -55,6 +56,20 @@ def _made(spec: KernelSpec, compiled: bool) -> SimpleNamespace:
             found = _loaded[spec, compiled] = _from_disk_or_built(spec) if compiled else _plain(spec)
             _spent.append(time.perf_counter() - started)
         return found
+
+
+@contextlib.contextmanager
+def fragment(name: str, text: str) -> Iterator[None]:
+    """A fragment of one's own within a block, for trying and for tests; raises ValueError where there is one of that name."""
+    if name in tried or (FRAGMENTS / f"{name}.py").exists():
+        raise ValueError(f"there is a kernel fragment {name!r} already")
+    tried[name] = text
+    try:
+        yield
+    finally:
+        del tried[name]
+        for key in [key for key in _loaded if name in key[0].fragments]:
+            del _loaded[key]
 
 
 def _renew_lock() -> None:

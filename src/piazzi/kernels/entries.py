@@ -21,7 +21,9 @@ def opened(text: str) -> str:
             continue
         arguments, begin = [], []
         for a in node.args.args:
-            kind = ast.unparse(a.annotation) if a.annotation else ""
+            if a.annotation is None:
+                raise ValueError(f"kernel entry {node.name!r} does not say what {a.arg!r} is")
+            kind = ast.unparse(a.annotation)
             slots = BUNDLES[kind].slots if kind in BUNDLES else None
             names = [a.arg] if slots is None else [f"{a.arg}_{slot}" for slot in slots]
             kinds = [kind] if slots is None else [_ANNOTATIONS[slot.kind] for slot in slots.values()]
@@ -54,8 +56,11 @@ def _signature(node: ast.FunctionDef) -> tuple[str, ...]:
     bundles = {}
     for statement in node.body:
         match statement:
-            case ast.Assign(value=ast.Call(func=ast.Name(id=name), args=[ast.Name(id=first), *_])) if name in BUNDLES:
-                bundles[first] = name
+            case ast.Assign(targets=[ast.Name(id=target)], value=ast.Call(func=ast.Name(id=name), args=args)) if (
+                name in BUNDLES
+            ):
+                if [ast.unparse(a) for a in args] == [f"{target}_{slot}" for slot in BUNDLES[name].slots]:
+                    bundles[ast.unparse(args[0])] = name
     out, skip = [], 0
     for a in node.args.args:
         if skip:

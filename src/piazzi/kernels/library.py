@@ -11,7 +11,19 @@ import numpy as np
 
 from piazzi.kernels.address import address
 from piazzi.kernels.entries import flat
-from piazzi.kernels.members import BUNDLES, FLOATS, INDICES, INTEGER, REAL, TYPES, Bundle, Slot, check_array, checked
+from piazzi.kernels.members import (
+    BUNDLES,
+    FLOATS,
+    INDICES,
+    INTEGER,
+    MOST_KINDS,
+    REAL,
+    TYPES,
+    Bundle,
+    Slot,
+    check_array,
+    checked,
+)
 
 _C_TYPES = {FLOATS: ctypes.c_void_p, INDICES: ctypes.c_void_p, INTEGER: ctypes.c_int64, REAL: ctypes.c_double}
 # Numba's wrapper mentions these for its error path, which kernels never take: they raise nothing
@@ -27,9 +39,9 @@ _NEVER_CALLED = (
 
 
 class _Callable:
-    """A function of bundles, arrays and numbers, which are checked: number, kinds, and the sizes of all against each other.
+    """A function of bundles, arrays and numbers, which are checked: how many, of what kind, and the sizes of all bundles.
 
-    Bundles are checked once for every kind of problem, arrays that come by themselves in every call.
+    That is done once for every kind of problem.  Of an array by itself only its type is known, which is checked in every call.
     """
 
     def __init__(self, name: str, signature: tuple[str, ...], sizes: Mapping[str, int]) -> None:
@@ -40,7 +52,7 @@ class _Callable:
     def _check(self, args: tuple[Any, ...]) -> None:
         if len(args) != len(self.signature):
             raise TypeError(f"kernel {self.name} takes {len(self.signature)} arguments, not {len(args)}")
-        kinds = tuple([a.kind for a in args if isinstance(a, Bundle)])
+        kinds = tuple([a.kind if isinstance(a, Bundle) else type(a) for a in args])
         for i, (a, kind) in enumerate(zip(args, self.signature, strict=True)):
             what = f"argument {i} of kernel {self.name}"
             if kind in BUNDLES:
@@ -53,11 +65,13 @@ class _Callable:
             else:
                 checked(what, Slot(kind, None), a, {})
         known = dict(self._sizes)
-        for found in kinds:
+        for found in (a.kind for a in args if isinstance(a, Bundle)):
             for name, size in found.sizes.items():
                 if known.setdefault(name, size) != size:
                     where = f"{size} in {found.bundle.__name__}, {known[name]} elsewhere"
                     raise ValueError(f"kernel {self.name}: {name} is {where}")
+        if len(self._seen) >= MOST_KINDS:
+            self._seen.clear()
         self._seen.add(kinds)
 
 
@@ -88,13 +102,14 @@ class Entry(_Callable):
     def _values(self, args: tuple[Any, ...]) -> list[Any]:
         """The arguments as object code takes them; one loop, because it runs at every call."""
         out: list[Any] = []
-        kinds = []
+        kinds: list[Any] = []
         for a in args:
             if isinstance(a, Bundle):
                 out += a.values
                 kinds.append(a.kind)
             else:
                 out.append(address(a) if isinstance(a, np.ndarray) else a)
+                kinds.append(type(a))
         if len(args) != len(self.signature) or tuple(kinds) not in self._seen:
             self._check(args)
         for i, kind in self._loose:

@@ -16,17 +16,22 @@ BUNDLES: dict[str, type[Bundle]] = {}
 
 
 class Slot(NamedTuple):
-    """A member: what it is, and its size along each axis, as a name and what is added to it; None where it is one number."""
+    """A member: what it is; its size along each axis, as a name and what is added to it, None where it is one number.
+
+    A whole number may have to be `equal` to a size.
+    """
 
     kind: str
     shape: tuple[tuple[str, int], ...] | None
+    equal: str = ""
 
     @classmethod
     def of(cls, text: str) -> Slot:
         """The member that a declaration describes."""
-        if text in ("int", "float"):
-            return cls({"int": INTEGER, "float": REAL}[text], None)
-        kind, sizes = (INDICES, text[6:]) if text.startswith("int64 ") else (FLOATS, text)
+        kind, _, rest = text.partition(" ")
+        if kind in ("int", "float"):
+            return cls({"int": INTEGER, "float": REAL}[kind], None, rest)
+        kind, sizes = (INDICES, rest) if kind == "int64" else (FLOATS, text)
         parts = [size.partition("+") for size in sizes.split()]
         return cls(kind, tuple((name, int(more or 0)) for name, _, more in parts))
 
@@ -50,16 +55,20 @@ class Bundle:
     kind : what a kernel has to have seen once
     """
 
+    members: tuple[Any, ...]
+    values: list[Any]
+    kind: Kind
+
     slots: ClassVar[Mapping[str, Slot]] = {}
     _types: ClassVar[tuple[Any, ...]]
-    _kinds: ClassVar[dict[Any, Kind]]
+    _kinds: ClassVar[dict[Any, Kind]]  # by shapes
+    _known: ClassVar[dict[frozenset[tuple[str, int]], Kind]]  # by sizes
     _plans: ClassVar[dict[Any, tuple[list[tuple[Any, Any]], Kind]]]
-    __slots__ = ("kind", "members", "values")
 
     def __init_subclass__(cls, **slots: str) -> None:
         cls.slots = {name: Slot.of(text) for name, text in slots.items()}
-        cls._types = tuple(None if slot.shape is None else TYPES[slot.kind] for slot in cls.slots.values())
-        cls._kinds, cls._plans = {}, {}
+        cls._types = tuple(slot.equal if slot.shape is None else TYPES[slot.kind] for slot in cls.slots.values())
+        cls._kinds, cls._known, cls._plans = {}, {}, {}
         for i, name in enumerate(slots):
             setattr(cls, name, property(_member(i)))
         BUNDLES[cls.__name__] = cls
@@ -80,13 +89,16 @@ class Bundle:
             name = type(self).__name__
             raise TypeError(f"{name} is made by names; missing: {lacking or 'none'}; unknown: {foreign or 'none'}")
         found: list[Any] = [members[name] for name in self.slots]
-        shapes = []
+        shapes: list[Any] = []
         for value, wanted_type in zip(found, self._types, strict=True):
-            if wanted_type is None:
-                shapes.append(type(value))
+            if type(wanted_type) is str:
+                shapes.append(value if wanted_type else type(value))
             elif type(value) is np.ndarray and value.dtype is wanted_type and value.flags.c_contiguous:
                 shapes.append(value.shape)
-        kind = self._kinds.get(tuple(shapes)) if len(shapes) == len(found) else None
+        try:
+            kind = self._kinds.get(tuple(shapes)) if len(shapes) == len(found) else None
+        except TypeError:  # an array where a number should be
+            kind = None
         self._keep(found, self._judged(members, tuple(shapes)) if kind is None else kind)
 
     def _judged(self, members: Mapping[str, Any], shapes: tuple[Any, ...]) -> Kind:
@@ -95,21 +107,19 @@ class Bundle:
         for member, slot in self.slots.items():
             checked(f"{type(self).__name__}.{member}", slot, members[member], sizes)
         kind = self._of(sizes)
-        if len(shapes) == len(self.slots) and len(self._kinds) < MOST_KINDS:
-            self._kinds[shapes] = kind
+        if len(shapes) == len(self.slots):
+            remember(self._kinds, shapes, kind)
         return kind
 
     @classmethod
     def _of(cls, sizes: Mapping[str, int]) -> Kind:
         key = frozenset(sizes.items())
-        found = cls._kinds.get(key)
-        if found is None:
-            found = cls._kinds[key] = Kind(cls, sizes)
-        return found
+        found = cls._known.get(key)
+        return remember(cls._known, key, Kind(cls, sizes)) if found is None else found
 
     def _keep(self, members: list[Any], kind: Kind) -> None:
         self.members, self.kind = tuple(members), kind
-        self.values = [m if t is None else address(m) for m, t in zip(members, self._types, strict=True)]
+        self.values = [m if type(t) is str else address(m) for m, t in zip(members, self._types, strict=True)]
 
     @classmethod
     def empty(cls, **sizes: int) -> Any:
@@ -118,9 +128,7 @@ class Bundle:
         if plan is None:
             known = {"*": 1, **sizes}
             shapes = [tuple([known[name] + more for name, more in slot.shape or ()]) for slot in cls.slots.values()]
-            plan = [*zip(shapes, cls._types, strict=True)], cls._of(sizes)
-            if len(cls._plans) < MOST_KINDS:
-                cls._plans[tuple(sizes.items())] = plan
+            plan = remember(cls._plans, tuple(sizes.items()), ([*zip(shapes, cls._types, strict=True)], cls._of(sizes)))
         out: Bundle = cls.__new__(cls)
         out.members = tuple([np.empty(shape, of) for shape, of in plan[0]])
         out.values, out.kind = [*map(address, out.members)], plan[1]
@@ -135,6 +143,14 @@ class Bundle:
         return _remade, (type(self), dict(zip(self.slots, self.members, strict=True)))
 
 
+def remember(known: dict[Any, Any], key: Any, value: Any) -> Any:
+    """Keep a value, in a dictionary that begins anew where it has become large."""
+    if len(known) >= MOST_KINDS:
+        known.clear()
+    known[key] = value
+    return value
+
+
 def _member(i: int) -> Callable[[Bundle], Any]:
     return lambda bundle: bundle.members[i]
 
@@ -147,8 +163,11 @@ def _remade(kind: type[Bundle], members: dict[str, Any]) -> Bundle:
 def checked(what: str, slot: Slot, value: Any, sizes: dict[str, int]) -> None:
     """Raise TypeError or ValueError unless a value fits a slot; `sizes` are known so far, and learn from it."""
     if slot.shape is None:
-        if (slot.kind == INTEGER and not isinstance(value, (int, np.integer))) or isinstance(value, np.ndarray):
+        whole = (int, np.integer)
+        if not isinstance(value, whole if slot.kind == INTEGER else (*whole, float, np.floating)):
             raise TypeError(f"{what} must be one {'whole ' if slot.kind == INTEGER else ''}number, not {value!r}")
+        if slot.equal and sizes.setdefault(slot.equal, int(value)) != value:
+            raise ValueError(f"{what} is {value}, but {slot.equal} is {sizes[slot.equal]} elsewhere")
         return
     if not isinstance(value, np.ndarray):
         raise TypeError(f"{what} must be an array, not {type(value).__name__}")
