@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.chain import GRADIENT, NO_LOSS, STEP, STEP_SMOOTHED, WIDEST, Chain, smoothed_covariances, solve_spec
+from piazzi.estimate.chain import GRADIENT, STEP, STEP_SMOOTHED, WIDEST, Chain, smoothed_covariances, solve_spec
 from piazzi.kernels import KernelSpec, bundle
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -54,22 +54,9 @@ class BorderedSolver:
         self.P_last = np.empty((nd, nd))
         Q = np.ascontiguousarray(problem.process_noise.covariance[:nd, :nd])
         self.run = bundle.Run(epochs=K, t_prior=i.t_prior, t=i.t, count=i.count, scale=i.scale, first_row=i.first_row, Q=Q)
-        self.states = bundle.Chain(
-            x=np.empty((K, nd)),
-            f=np.empty((K, nd)),
-            Phi=np.empty((K, nd, nd)),
-            Q_all=np.empty((len(chain.Q_all), nd, nd)),
-            nu=np.empty((J, M)),
-            H=np.empty((J, M, nd)),
-            d_pred=np.empty((K, nd)),
-            P_pred=np.empty((K, nd, nd)),
-            gains=np.empty((i.most_rows * M + nd, nd + 1)),
-            multiplier=np.empty((K, nd)),
-            dx=np.empty((K, nd)),
-            scaling=np.ascontiguousarray(chain.scaling[:nd, :nd]),
-            loss=NO_LOSS,
-            weights=NO_LOSS,
-        )
+        L, A = len(chain.Q_all), i.most_rows * M + nd
+        self.states = bundle.Chain.empty(X=K, C=K, N=nd, L=L, B=J, M=M, A=A)
+        self.states.scaling[:] = chain.scaling[:nd, :nd]
         self.unknowns = bundle.Border(
             constants=C,
             root=root_of(problem.covariance[:nd, :nd]),
