@@ -23,6 +23,7 @@ expressions
 model
 kernels
 earth
+formats
 problem tracking orbit
 scenarios
 simulation

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from piazzi.evaluate.observing import observability
     from piazzi.evaluate.window_lengths import windows
     from piazzi.evaluate.window_trade import WindowTrade
+    from piazzi.formats import Ephemeris, Observations, read_ephemeris, read_tracking
     from piazzi.kernels import (
         ConstantAcceleration,
         Discrete,
@@ -79,6 +80,7 @@ _WHERE = {
         "piazzi.kernels": "ConstantAcceleration Discrete DormandPrince DormandPrince5 Euler Heun Integrator Kepler Midpoint "
         "Ralston RungeKutta RungeKutta4 RungeKutta8 Taylor",
         "piazzi.earth": "Epoch",
+        "piazzi.formats": "Ephemeris Observations read_ephemeris read_tracking",
         "piazzi.problem": "Gaussian Manoeuvre Problem ProcessNoise Station Tracking Truth with_gauss_markov",
         "piazzi.orbit": "kepler_transition propagate_kepler",
         "piazzi.simulation": "simulate",
@@ -104,13 +106,14 @@ _WHERE = {
 __version__ = "0.1.0"
 __all__ = [
     "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Discrete", "DormandPrince",
-    "DormandPrince5", "Epoch", "Estimate", "Euler", "ExtendedKalmanFilter", "FactorGraph", "Forecast", "Gaussian", "Heun",
-    "Huber", "Integrator", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre", "Midpoint", "Model",
-    "Observability", "Parameter", "Prediction", "Problem", "ProcessNoise", "Ralston", "RungeKutta", "RungeKutta4",
-    "RungeKutta8", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station", "Study", "Taylor",
-    "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps", "compare", "earth",
-    "kepler_transition", "load", "observability", "predict", "propagate_kepler", "read_store", "simulate", "step_warning",
-    "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
+    "DormandPrince5", "Ephemeris", "Epoch", "Estimate", "Euler", "ExtendedKalmanFilter", "FactorGraph", "Forecast",
+    "Gaussian", "Heun", "Huber", "Integrator", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre",
+    "Midpoint", "Model", "Observability", "Observations", "Parameter", "Prediction", "Problem", "ProcessNoise", "Ralston",
+    "RungeKutta", "RungeKutta4", "RungeKutta8", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station",
+    "Study", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps",
+    "compare", "earth", "kepler_transition", "load", "observability", "predict", "propagate_kepler", "read_ephemeris",
+    "read_store", "read_tracking", "simulate", "step_warning", "substep_error", "update", "windows", "with_gauss_markov",
+    "with_prior_at", "write_report",
 ]  # fmt: skip
 
 

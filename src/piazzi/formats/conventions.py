@@ -1,0 +1,165 @@
+"""What a user says about files that do not say it themselves."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from piazzi.earth.scales import SCALES
+from piazzi.formats.kinds import ANGLES, KINDS
+from piazzi.formats.observations import Array, Observations, Segment
+from piazzi.text import nearest
+from piazzi.units import Units
+
+RANGES = {"one-way": ("one-way", "sum"), "two-way": ("two-way", "half"), "round-trip": ("two-way", "sum")}
+RANGES |= {"three-way": ("three-way", "sum")}
+_SIGMA = re.compile(r"(?:(?P<kind>[a-z_]+)(?:\.(?P<station>[^=]+))?=)?(?P<number>[-+.0-9eE]+)\s*(?P<unit>[a-zA-Z/*^0-9]*)")
+
+
+@dataclass(frozen=True)
+class Sigma:
+    """A standard deviation in SI for rows of these kinds and of a station (None: of all)."""
+
+    kinds: tuple[str, ...]
+    station: str | None
+    value: float
+
+
+@dataclass(frozen=True)
+class Conventions:
+    """Answers to what files leave open.
+
+    Attributes
+    ----------
+    range : ``one-way``, ``two-way`` (half of the way there and back), ``round-trip`` (all of it) or ``three-way``
+    angles : ``astrometric``, ``geocentric`` or ``apparent``
+    scales : time scale by station, that of all others under ""
+    sigmas : standard deviations
+    options : whatever else one format asks for, by name
+    """
+
+    range: str | None = None
+    angles: str | None = None
+    scales: tuple[tuple[str, str], ...] = ()
+    sigmas: tuple[Sigma, ...] = ()
+    options: tuple[tuple[str, Any], ...] = ()
+
+    @classmethod
+    def of(cls, *, angles: Any = None, time: Any = None, sigma: Any = None, **options: Any) -> Conventions:
+        """Conventions from words, as the command line and `read_tracking` take them.
+
+        Raises
+        ------
+        ValueError
+            For a word that is none of those, with the nearest.
+        """
+        legs = options.pop("range", None)
+        if legs is not None and legs not in RANGES:
+            raise ValueError(f"a range is {', '.join(RANGES)}, not {legs!r}{nearest(str(legs), RANGES)}")
+        if angles is not None and angles not in ANGLES:
+            raise ValueError(f"angles are {', '.join(ANGLES)}, not {angles!r}{nearest(str(angles), ANGLES)}")
+        scales = tuple(_scale(text) for text in _texts(time))
+        sigmas = tuple(_sigma(text) for text in _texts(sigma))
+        return cls(legs, angles, scales, sigmas, tuple(options.items()))
+
+    def scale_of(self, station: str) -> str | None:
+        """The time scale that the user says a station's dates are in."""
+        told = dict(self.scales)
+        return told.get(station, told.get(""))
+
+    def option(self, name: str) -> Any:
+        """What else was said, None where it was not."""
+        return dict(self.options).get(name)
+
+
+def _texts(given: Any) -> list[str]:
+    """One text, several, or a mapping from what to what, as a list of ``what=value``."""
+    if given is None:
+        return []
+    if isinstance(given, str):
+        return [given]
+    if isinstance(given, Mapping):
+        return [f"{name}={value}" if name else str(value) for name, value in given.items()]
+    return [str(text) for text in given] if isinstance(given, Iterable) else [str(given)]
+
+
+def _scale(text: str) -> tuple[str, str]:
+    station, equals, scale = text.rpartition("=")
+    if scale.upper() not in SCALES:
+        raise ValueError(f"{scale!r} is no time scale; there are {', '.join(SCALES)}, as in time=GPS or time=BER=GPS")
+    return (station if equals else "", scale.upper())
+
+
+def _sigma(text: str) -> Sigma:
+    match = _SIGMA.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(f"sigma {text!r} cannot be read: write it as range.BER=10m, range_rate=1mm/s or 10m")
+    kind, unit = match["kind"], Units().unit(match["unit"] or "1")
+    if kind is not None and kind not in KINDS:
+        raise ValueError(f"sigma {text!r}: {kind!r} is no kind of measurement{nearest(kind, KINDS)}")
+    try:
+        value = float(match["number"]) * unit.factor
+    except ValueError:
+        raise ValueError(f"sigma {text!r}: {match['number']!r} is no number") from None
+    if not (np.isfinite(value) and value > 0):
+        raise ValueError(f"sigma {text!r} must be positive")
+    kinds = tuple(name for name in KINDS if not KINDS[name].auxiliary and _powers(name) == unit.powers)
+    if not kinds or (kind is not None and kind not in kinds):
+        raise ValueError(f"sigma {text!r}: {kind or 'no measurement'} has the unit {match['unit'] or '1'}, as in range=10m")
+    return Sigma((kind,) if kind else kinds, match["station"], value)
+
+
+def _powers(kind: str) -> tuple[Any, ...] | None:
+    """Exponents of a kind's unit, None for units that only the kind itself has."""
+    try:
+        return Units().unit(KINDS[kind].unit.replace("cycle", "1")).powers
+    except ValueError:
+        return None
+
+
+def with_conventions(observations: Observations, told: Conventions) -> Observations:
+    """Observations with what the user says where their files do not, and `open` without what is now said.
+
+    Raises
+    ------
+    ValueError
+        For a sigma that no row takes.
+    """
+    segments = tuple(_completed(segment, told) for segment in observations.segments)
+    sigma = _sigmas(observations, told)
+    all_known = bool(told.sigmas) and not np.isnan(sigma[observations.measured]).any()
+    answered = {"--range": told.range, "--angles": told.angles, "--sigma": all_known}
+    left = tuple(text for text in observations.open if not any(on and option in text for option, on in answered.items()))
+    return replace(observations, segments=segments, open=left, sigma=sigma)
+
+
+def _completed(segment: Segment, told: Conventions) -> Segment:
+    if told.range is not None:
+        way, range_is = RANGES[told.range]
+        segment = replace(segment, way=segment.way or way, range_is=segment.range_is or range_is)
+    if told.angles is not None:
+        segment = replace(segment, angles=segment.angles or told.angles)
+    return segment
+
+
+def _sigmas(observations: Observations, told: Conventions) -> Array:
+    """Sigmas of the files, and of the user where they have none; what says more (kind, station) goes before what says less."""
+    sigma = observations.sigma
+    if not told.sigmas:
+        return sigma
+    sigma = sigma.copy()
+    missing = np.isnan(sigma)
+    for rule in sorted(told.sigmas, key=lambda rule: (rule.station is not None, len(rule.kinds) == 1)):
+        rows = missing & observations.of_kind(*rule.kinds)
+        if rule.station is not None:
+            if rule.station not in observations.participants:
+                raise ValueError(
+                    f"sigma for {rule.station!r}: no such station{nearest(rule.station, observations.participants)}"
+                )
+            rows = rows & (observations.station == observations.participants.index(rule.station))
+        sigma[rows] = rule.value
+    return sigma

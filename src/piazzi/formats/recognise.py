@@ -1,0 +1,115 @@
+"""The door of files: their format by what is in them, never by what they are called."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from piazzi.formats.conventions import Conventions, with_conventions
+from piazzi.formats.ephemeris import Ephemeris
+from piazzi.formats.observations import Observations
+from piazzi.formats.source import read_bytes
+
+HEAD = 4096  # bytes that a format is told by
+
+
+class Format(NamedTuple):
+    """How a format is told by a file's first bytes, and who reads it: ``module:function`` below `piazzi.formats`.
+
+    A reader takes the bytes, the name for messages and the `Conventions`, and raises ValueError with name, line and reason.
+    """
+
+    looks: Callable[[bytes], bool]
+    tracking: str | None = None
+    ephemeris: str | None = None
+
+
+def _begins(pattern: bytes) -> Callable[[bytes], bool]:
+    """Whether the first line with anything in it, past comments, is like that."""
+    compiled = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|COMMENT[^\n]*\n)*" + pattern)
+    return lambda head: compiled.match(head) is not None
+
+
+def _root(element: bytes) -> Callable[[bytes], bool]:
+    """Whether the first element of an XML file has that name."""
+    compiled = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?.*?\?>|<!--.*?-->|\s)*<(?:\w+:)?" + element + rb"[\s/>]", re.S)
+    return lambda head: compiled.match(head) is not None
+
+
+FORMATS: Mapping[str, Format] = {}  # name: how it is told, who reads it
+
+
+def recognise(data: bytes) -> str | None:
+    """Name of the format in `FORMATS` that some bytes are of, None where they are of none."""
+    head = data[:HEAD]
+    return next((name for name, form in FORMATS.items() if form.looks(head)), None)
+
+
+def read_tracking(*paths: str | os.PathLike[str], **conventions: Any) -> Observations:
+    """Measurements of files of tracking data, recognised by what is in them; ``.gz`` and ``.Z`` are taken as they are.
+
+    Parameters
+    ----------
+    paths : files, put together in this order
+    conventions : what the files do not say, see `formats.conventions.Conventions`: ``range="two-way"``, ``time="GPS"``,
+        ``angles="geocentric"``, ``sigma="range.BER=10m"``
+
+    Raises
+    ------
+    OSError
+        Where a file cannot be read.
+    ValueError
+        With file, line and reason: for a format that is not known, a broken file, or a convention that contradicts it.
+    """
+    from piazzi.formats.joining import concatenate
+
+    told = Conventions.of(**conventions)
+    return with_conventions(concatenate(_tracking(path, told) for path in paths), told)
+
+
+def _tracking(path: str | os.PathLike[str], told: Conventions) -> Observations:
+    data, form, name = _opened(path)
+    if form.tracking is None:
+        raise ValueError(f"{name}: the file holds orbits, not measurements; read_ephemeris reads it")
+    found: Observations = _reader(form.tracking)(data, name, told)
+    return found
+
+
+def read_ephemeris(path: str | os.PathLike[str], **conventions: Any) -> Ephemeris:
+    """States of a file of ephemerides, recognised by what is in it; ``.gz`` and ``.Z`` are taken as they are.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be read.
+    ValueError
+        With file, line and reason: for a format that is not known, or a broken file.
+    """
+    data, form, name = _opened(path)
+    if form.ephemeris is None:
+        raise ValueError(f"{name}: the file holds no ephemeris")
+    found: Ephemeris = _reader(form.ephemeris)(data, name, Conventions.of(**conventions))
+    return found
+
+
+def _opened(path: str | os.PathLike[str]) -> tuple[bytes, Format, str]:
+    name, data = os.fspath(path), read_bytes(path)
+    if not data.strip():
+        raise ValueError(f"{name}: the file is empty")
+    found = recognise(data)
+    if found is None:
+        raise ValueError(f"{name}: line 1: the file is of no format that is known: {', '.join(_names())}")
+    return data, FORMATS[found], name
+
+
+def _names() -> Iterator[str]:
+    yield from dict.fromkeys(name.removesuffix(" XML") for name in FORMATS)
+
+
+def _reader(where: str) -> Callable[[bytes, str, Conventions], Any]:
+    module, _, function = where.partition(":")
+    reader: Callable[[bytes, str, Conventions], Any] = getattr(import_module(f"piazzi.formats.{module}"), function)
+    return reader
