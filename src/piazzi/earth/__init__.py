@@ -4,9 +4,22 @@ from piazzi.earth.eop import EOP, EOPTable, EOPWarning, read_eop
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import GravityField, gravity_field, read_gravity
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
+from piazzi.earth.ilrs import ilrs_stations
 from piazzi.earth.rotation import FRAMES, rotation, rotation_rate, transform
+from piazzi.earth.station_files import read_stations
+from piazzi.earth.stations import (
+    Coordinates,
+    Eccentricity,
+    Station,
+    StationList,
+    StationWarning,
+    azimuth_elevation_range,
+    up_north_east,
+)
 
 __all__ = [
-    "EOP", "FRAMES", "EOPTable", "EOPWarning", "Epoch", "GravityField", "geodetic_to_position", "gravity_field",
-    "position_to_geodetic", "read_eop", "read_gravity", "rotation", "rotation_rate", "transform",
+    "EOP", "FRAMES", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch", "GravityField", "Station", "StationList",
+    "StationWarning", "azimuth_elevation_range", "geodetic_to_position", "gravity_field", "ilrs_stations",
+    "position_to_geodetic", "read_eop", "read_gravity", "read_stations", "rotation", "rotation_rate", "transform",
+    "up_north_east",
 ]  # fmt: skip
