@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from piazzi import earth
+    from piazzi import earth, orbit
     from piazzi.earth import Epoch
     from piazzi.estimate import (
         Bank,
@@ -98,7 +98,7 @@ _WHERE = {
         "piazzi.evaluate.window_trade": "WindowTrade",
         "piazzi.study": "Study read_store",
         "piazzi.present.report": "write_report",
-        "": "earth",
+        "": "earth orbit",
     }.items()
     for name in names.split()
 }
@@ -111,9 +111,9 @@ __all__ = [
     "Midpoint", "Model", "Observability", "Observations", "Parameter", "Prediction", "Problem", "ProcessNoise", "Ralston",
     "RungeKutta", "RungeKutta4", "RungeKutta8", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station",
     "Study", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps",
-    "compare", "earth", "kepler_transition", "load", "observability", "predict", "propagate_kepler", "read_ephemeris",
-    "read_store", "read_tracking", "simulate", "step_warning", "substep_error", "update", "windows", "with_gauss_markov",
-    "with_prior_at", "write_report",
+    "compare", "earth", "kepler_transition", "load", "observability", "orbit", "predict", "propagate_kepler",
+    "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning", "substep_error", "update", "windows",
+    "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip
 
 
