@@ -19,13 +19,14 @@ BOUND = 20.0
 def figures() -> Iterator[Figure]:
     import jax_filters
 
-    from piazzi.study.lanes import Layout, filter_runs
+    from piazzi.study.ensemble import Layout, filter_runs
 
     problem, tracking = pz.load(recording())
     z = tracking.values[None, :, :] + 1e-4 * np.random.default_rng(0).normal(size=(RUNS, *tracking.values.shape))
+    truth = np.zeros((len(z), len(tracking.times), problem.model.n))  # scores are part of it
     layout = Layout(problem, tracking.times)
-    filter_runs(layout, z[:8])  # load the compiled code
-    runs = {"ours": lambda: filter_runs(layout, z)[0]}
+    filter_runs(layout, z[:8], truth[:8])  # load the compiled code
+    runs = {"ours": lambda: filter_runs(layout, z, truth)[0]}
     runs |= {library: getattr(jax_filters, name)(problem, tracking, z) for library, name in LIBRARIES.items()}
     last = {library: run() for library, run in runs.items()}
     times = rounds(runs, ROUNDS)

@@ -173,7 +173,7 @@ def test_where_no_start_leads_anywhere_the_usual_one_is_told(monkeypatch):
     problem, tracking = mirrored()
     tracking = pz.Tracking(tracking.times[:6], tracking.values[:6])
     monkeypatch.setattr("piazzi.estimate.bank.STEPS", 1)
-    monkeypatch.setattr("piazzi.estimate.gauss_newton.GRADED", 0.0)
+    monkeypatch.setattr("piazzi.estimate.gauss_newton.ACCEPTABLE", 0.0)
     usual = pz.FactorGraph(max_iterations=1).estimate(problem, tracking)
     bank = pz.FactorGraph(start=pz.Bank(3), max_iterations=1).estimate(problem, tracking)
     assert not usual.success

@@ -33,7 +33,7 @@ def ended(monkeypatch, sizes, **changes):
     ],
 )
 def test_small_steps_that_do_not_shrink_much_are_rounding(monkeypatch, sizes, iterations, why):
-    found, stopped = ended(monkeypatch, sizes, AMPLIFIED=np.inf)
+    found, stopped = ended(monkeypatch, sizes, MOST_AMPLIFIED=np.inf)
     assert found == iterations
     assert why in stopped
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.evaluate.information import along, bound, coast, factor, from_first, growth, predicted, singular
+from piazzi.evaluate.information import along, bound, factor, from_first, growth, predicted, propagated, singular
 from piazzi.evaluate.twins import find_twins
 from piazzi.problem.inputs import prepare
 from tests.laws.problems import linear, network, random_covariance, random_stable, satellite
@@ -135,7 +135,7 @@ def test_the_derivative_belongs_to_the_filter_that_starts_there():
 
 def test_a_coasting_orbit_is_the_truth_without_process_noise():
     problem, tracking = range_only()
-    orbit = coast(problem, prepare(problem, tracking), tracking.truth[0])
+    orbit = propagated(problem, prepare(problem, tracking), tracking.truth[0])
     assert_allclose(orbit, tracking.truth, atol=1e-9)
     z = predicted(problem, prepare(problem, tracking), orbit)
     assert_allclose(z[:, 0], np.hypot(orbit[:, 0] - 10, orbit[:, 1]), rtol=1e-12)

@@ -19,7 +19,7 @@ def source_of(*fragments: str) -> str:
 
 
 def test_parts_that_fit_together_are_a_kernel():
-    assert "def evaluate_step(" in source_of("matrices", "coast_steps", "transition", "functions")
+    assert "def evaluate_step(" in source_of("matrices", "arc_steps", "transition", "functions")
 
 
 def test_a_name_that_nothing_defines_is_told_with_the_fragment_that_has_it():
@@ -32,7 +32,7 @@ def test_a_name_that_nothing_defines_is_told_with_the_fragment_that_has_it():
 
 def test_two_definitions_of_a_function_are_refused():
     with pytest.raises(ValueError, match=r"function '\w+' is defined in 'linearize_each' and in 'linearize_scaled'"):
-        source_of("matrices", "coast_steps", "transition", "linearize_each", "linearize_scaled")
+        source_of("matrices", "arc_steps", "transition", "linearize_each", "linearize_scaled")
     with pytest.raises(ValueError, match="function 'f' is defined twice in 'a'"):
         check_names({"a": "def f(x):\n    return x\n\ndef f(x):\n    return x\n"})
 

@@ -185,7 +185,7 @@ def test_considered_constant_of_an_angle_at_half_a_turn(variance, monkeypatch):
 
 def test_failed_estimate_with_considered_parameters_predicts_nothing(monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
-    monkeypatch.setattr("piazzi.estimate.gauss_newton.GRADED", 0.0)
+    monkeypatch.setattr("piazzi.estimate.gauss_newton.ACCEPTABLE", 0.0)
     station = pz.Station("radar", "range", 0.01, {"mx": pz.Gaussian(10.0, 0.01), "my": 0.0}, considered=["mx"])
     problem = b612(stations=[station])
     tracking = pz.simulate(b612(), np.arange(5) * 0.1, np.random.default_rng(0))

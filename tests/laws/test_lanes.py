@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
-from piazzi.study.lanes import Layout, filter_runs, simulate_runs
+from piazzi.study.ensemble import Layout, filter_runs, simulate_runs
 from tests.laws.graphs import LinearCase, passes, spacecraft
 from tests.laws.lanes import (
     assert_rounding,
@@ -173,9 +173,9 @@ def test_runs_of_a_study(case, at_truth):
         runs = simulated(problem, *draws)
         estimates = filtered(problem, *runs)
     with lanes(wide()), kernels_used() as specs:
-        runs_in_lanes = simulated(problem, *draws)
+        runs_in_ensemble = simulated(problem, *draws)
         estimates_in_lanes = filtered(problem, *runs)
     assert work_in_lanes(specs)
 
-    assert_rounding(apart_in_truth(runs_in_lanes, runs))
+    assert_rounding(apart_in_truth(runs_in_ensemble, runs))
     assert_rounding(apart_in_estimate(estimates_in_lanes, estimates))

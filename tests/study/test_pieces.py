@@ -103,8 +103,8 @@ def test_a_run_without_a_truth_fails_in_every_row():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("change", [{"method": "integral"}, {"integrator": pz.RungeKutta8(2)}])
-def test_problems_that_need_more_than_lanes_are_the_same_study(change):
-    """Integrated process noise has no lanes: run by run, by the same draws and scores."""
+def test_problems_that_make_no_ensemble_are_the_same_study(change):
+    """Integrated process noise makes no ensemble: run by run, by the same draws and scores."""
     study = Study(satellite(**change), np.arange(20) * 15.0, ["ekf", "smoother"], 5)
     task = Task(0, 0, 5)
     piece = run_task(study, task)
@@ -114,10 +114,10 @@ def test_problems_that_need_more_than_lanes_are_the_same_study(change):
     assert np.isfinite(bound["bound"]).all()
 
 
-def test_lanes_and_single_runs_are_the_same_truths(monkeypatch):
+def test_an_ensemble_and_single_runs_are_the_same_truths(monkeypatch):
     study = small(problem=drawn_truth(), estimators=("ekf",))
     together = simulated(study, Task(0, 0, 9))
-    monkeypatch.setattr(pz.Problem, "runs_in_lanes", False)
+    monkeypatch.setattr(pz.Problem, "runs_in_ensemble", False)
     alone = simulated(study, Task(0, 0, 9))
     assert_allclose(alone.truth, together.truth, rtol=1e-11, atol=1e-11)
     assert_allclose(alone.z, together.z, rtol=1e-11, atol=1e-11)
@@ -166,7 +166,7 @@ def test_long_runs_are_kept_at_evenly_spaced_epochs():
 
 
 def test_considered_parameters_count_in_a_study_too():
-    """Their share of the covariance is not the lanes' to add: such runs go one by one."""
+    """Their share of the covariance is not the ensemble's to add: such runs go one by one."""
     model = pz.Model(
         ["x", "v"], ["v", "-k*x"], [pz.Sensor("place", ["x"])], [pz.Parameter("k", "considered")], groups={"all": ["x", "v"]}
     )

@@ -12,7 +12,7 @@ import numpy as np
 from piazzi.estimate.chain import Chain, Solver
 from piazzi.estimate.gauss_newton import Outcome
 from piazzi.estimate.kalman import filter_run
-from piazzi.estimate.robust import RobustChain, descend, gated_run, stand
+from piazzi.estimate.robust import RobustChain, gated_run, minimize, solve_at
 from piazzi.estimate.width import TOO_WIDE
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -109,7 +109,7 @@ def root(covariance: Array) -> Array:
     return np.asarray(unit[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def believing(problem: Problem, mean: Array, covariance: Array) -> Problem:
+def with_prior(problem: Problem, mean: Array, covariance: Array) -> Problem:
     """The problem as the kernels would see it with this prior of all values; only they should see it."""
     other = copy.copy(problem)
     other.__dict__.update(mean=mean, covariance=np.ascontiguousarray(covariance))
@@ -127,13 +127,13 @@ def search(bank: Bank, chain: Chain, solver: Solver, inputs: Inputs, first: Outc
         states = member_start(bank, chain, inputs, point)
         if not np.isfinite(states).all():
             continue
-        outcome = descend(chain, solver, states, STEPS, tolerance, direct=True)
+        outcome = minimize(chain, solver, states, STEPS, tolerance, direct=True)
         iterations += outcome.iterations
         if not outcome.failure:
             modes = merged(modes, found(chain, outcome))
     modes.sort(key=lambda mode: -mode.log_evidence)
-    stand(chain, solver, modes[0].states if modes else states_first)
-    details = told(modes, chain, inputs)
+    solve_at(chain, solver, modes[0].states if modes else states_first)
+    details = mode_details(modes, chain, inputs)
     if not modes:
         return replace(first, iterations=iterations, details=first.details | details)
     won = {} if modes[0].usual else {"start": "bank"}
@@ -142,7 +142,7 @@ def search(bank: Bank, chain: Chain, solver: Solver, inputs: Inputs, first: Outc
 
 def member_start(bank: Bank, chain: Chain, inputs: Inputs, point: Array) -> Array:
     """States at all nodes of the chain, filtered from a belief about `point`."""
-    problem = believing(chain.problem, np.ascontiguousarray(point), bank.spread**2 * chain.problem.covariance)
+    problem = with_prior(chain.problem, np.ascontiguousarray(point), bank.spread**2 * chain.problem.covariance)
     try:
         states = gated_run(problem, inputs) if isinstance(chain, RobustChain) else filter_run(problem, inputs)[0]
     except ValueError:  # no derivative at this very point
@@ -190,7 +190,7 @@ def log_determinant(chain: Chain) -> float:
     return total
 
 
-def told(modes: list[Mode], chain: Chain, inputs: Inputs) -> dict[str, object]:
+def mode_details(modes: list[Mode], chain: Chain, inputs: Inputs) -> dict[str, object]:
     """The modes as details of an estimate; those with hardly any probability are left out."""
     share = np.exp(np.array([mode.log_evidence - modes[0].log_evidence for mode in modes]))
     share /= share.sum()

@@ -21,7 +21,7 @@ from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.inputs import prepare, with_prior_node
 
-PATIENCE = 15  # iterations from the prior before the graph is asked; where it converges at all, half of them suffice
+MAX_FROM_PRIOR = 15  # iterations from the prior before the graph is asked; where it converges at all, half of them suffice
 
 
 class ShootingSolver(BorderedSolver):
@@ -91,14 +91,14 @@ class BatchLeastSquares:
         ValueError
             Where the tracking does not fit the problem, or the start has the wrong shape.
         """
-        calm = undisturbed(problem)
-        inputs = prepare(calm, tracking)
+        noise_free = undisturbed(problem)
+        inputs = prepare(noise_free, tracking)
         nodes = with_prior_node(inputs)
         skip = nodes.epochs - inputs.epochs
         watch = Stopwatch()
-        chain = Chain(calm, nodes)
+        chain = Chain(noise_free, nodes)
         solver = ShootingSolver(chain)
-        outcome, used = self._optimize(chain, solver, calm, tracking)
+        outcome, used = self._optimize(chain, solver, noise_free, tracking)
         nu, S = chain.innovations()
         return Estimate(
             problem,
@@ -112,23 +112,23 @@ class BatchLeastSquares:
             "delayed",
             None,
             outcome.details | {"start": used, "residuals": chain.residuals()},
-            outcome.failure or undetermined(calm, outcome.covariance[0], chain.x),
+            outcome.failure or undetermined(noise_free, outcome.covariance[0], chain.x),
         )
 
-    def _optimize(self, chain: Chain, solver: ShootingSolver, calm: Problem, tracking: Tracking) -> tuple[Outcome, str]:
+    def _optimize(self, chain: Chain, solver: ShootingSolver, noise_free: Problem, tracking: Tracking) -> tuple[Outcome, str]:
         """Optimise from the start, and where that fails from the full graph."""
-        first = self._first(calm)
+        first = self._first(noise_free)
         used = "prior" if self.start is None else "given"
-        patience = self.max_iterations if self.start is not None else min(self.max_iterations, PATIENCE)
-        outcome = optimize(chain, solver, np.broadcast_to(first, chain.x.shape), patience, self.tolerance)
+        limit = self.max_iterations if self.start is not None else min(self.max_iterations, MAX_FROM_PRIOR)
+        outcome = optimize(chain, solver, np.broadcast_to(first, chain.x.shape), limit, self.tolerance)
         if not (outcome.failure or "remark" in outcome.details):
             return outcome, used
-        graph = nominal(FactorGraph(), calm, tracking)
+        graph = nominal(FactorGraph(), noise_free, tracking)
         begin = np.asarray(graph.details["first_state"]) if graph.success else chain.x[0].copy()
         again = optimize(chain, solver, np.broadcast_to(begin, chain.x.shape), self.max_iterations, self.tolerance)
         spent = outcome.iterations + graph.iterations + again.iterations
-        told = f"{again.failure}; the full graph: {graph.message}" if again.failure and not graph.success else again.failure
-        return replace(again, iterations=spent, failure=told), f"{used}, then graph" if graph.success else used
+        failure = f"{again.failure}; the full graph: {graph.message}" if again.failure and not graph.success else again.failure
+        return replace(again, iterations=spent, failure=failure), f"{used}, then graph" if graph.success else used
 
     def _first(self, problem: Problem) -> Array:
         if self.start is None:

@@ -7,8 +7,8 @@ import numpy as np
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
-OPEN = 1e6  # times the size of a value: a prior that wide says that it is not known
-UNTOUCHED = 0.9  # of the prior's variance: the measurements said nothing
+WIDE = 1e6  # times the size of a value: a prior that wide says that it is not known
+UNINFORMED = 0.9  # of the prior's variance: the measurements said nothing
 
 
 def undetermined(problem: Problem, first: Array, states: Array, last: Array | None = None) -> str:
@@ -24,25 +24,25 @@ def undetermined(problem: Problem, first: Array, states: Array, last: Array | No
         So do dynamics that let the direction shrink: what they take from it counts as closed.
     """
     sigma = np.sqrt(np.diag(problem.covariance))
-    if not (sigma > OPEN * np.maximum(np.abs(states[0]), 1.0)).any():  # a lower bound of the sizes, which are dearer
+    if not (sigma > WIDE * np.maximum(np.abs(states[0]), 1.0)).any():  # a lower bound of the sizes, which are dearer
         return ""
-    wide = sigma > OPEN * _sizes(problem, states)
+    wide = sigma > WIDE * _sizes(problem, states)
     if not wide.any():
         return ""
-    direction = _open(first, sigma, wide)
-    if direction is None or (last is not None and _open(last, sigma, wide) is None):
+    direction = _widest_direction(first, sigma, wide)
+    if direction is None or (last is not None and _widest_direction(last, sigma, wide) is None):
         return ""
     return f"the measurements do not determine {_words(problem, direction)}: it is as uncertain as the prior left it"
 
 
-def _open(covariance: Array, sigma: Array, wide: Array) -> Array | None:
+def _widest_direction(covariance: Array, sigma: Array, wide: Array) -> Array | None:
     """The widest direction in units of the prior's sigma, None where the measurements said something about it."""
     if not np.isfinite(covariance).all():
         return None
     unit = np.where(sigma > 0, sigma, 1.0)
     values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
     direction: Array = vectors[:, -1]
-    return direction if values[-1] > UNTOUCHED and wide[np.argmax(np.abs(direction))] else None
+    return direction if values[-1] > UNINFORMED and wide[np.argmax(np.abs(direction))] else None
 
 
 def _sizes(problem: Problem, states: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain
-from piazzi.estimate.width import RESTLESS, TOO_WIDE
+from piazzi.estimate.width import NOT_BORDERED, TOO_WIDE
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs, with_prior_node
@@ -23,7 +23,7 @@ def smoothed(problem: Problem, inputs: Inputs, states: Array) -> tuple[Array, Ar
         Where noise or a manoeuvre moves an estimated constant.
     """
     if not BorderedSolver.applies(problem):
-        raise ValueError(f"{TOO_WIDE} beside the noise of the measurements: {RESTLESS}")
+        raise ValueError(f"{TOO_WIDE} beside the noise of the measurements: {NOT_BORDERED}")
     nodes = with_prior_node(inputs)
     skip = nodes.epochs - inputs.epochs
     chain = Chain(problem, nodes)

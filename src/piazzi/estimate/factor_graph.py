@@ -15,13 +15,13 @@ from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate, View
 from piazzi.estimate.gauss_newton import Outcome
-from piazzi.estimate.joint_mode import applies, marginal, remark
+from piazzi.estimate.joint_mode import applies, bias_message, marginal
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.losses import Cauchy, loss_of
-from piazzi.estimate.robust import RobustChain, chain_for, descend, gated_run, stand
+from piazzi.estimate.robust import RobustChain, chain_for, gated_run, minimize, solve_at
 from piazzi.estimate.sliding_window import SlidingWindow
 from piazzi.estimate.stopwatch import Stopwatch
-from piazzi.estimate.width import DIFFUSE, RESTLESS, TOO_WIDE
+from piazzi.estimate.width import DIFFUSE, NOT_BORDERED, TOO_WIDE
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.inputs import Inputs, prepare, with_prior_node
@@ -30,7 +30,7 @@ STARTS = ("ekf", "prior", "window", "bank")
 CONSTANTS = ("joint", "marginal")
 SOLVERS = ("auto", "chain", "bordered")
 # iterations that a second solution may take before the first is kept
-CHALLENGE = 20
+MAX_SECOND = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class FactorGraph:
     pseudo-inverse of Q and stands beside "defect", the largest violation of the dynamics in prior standard deviations.
 
     With a loss the cost is the robust one, found by iterated reweighting; the start is a filter with a gate, and where the
-    solution then disowns many measurements, a window with a loss and the prior are tried too.  Tukey's and Cauchy's losses are
+    solution then rejects many measurements, a window with a loss and the prior are tried too.  Tukey's and Cauchy's losses are
     followed from where Huber's leads, and from given states or a bank's members directly too.  Covariances are those of the
     weighted measurements: they allow for rows that were weighted down, not for having chosen them by their residuals, and are
     some per cent off where noise is Gaussian or worse.
@@ -145,8 +145,8 @@ class FactorGraph:
         """The outcome with its constants at the marginal mode, where that is asked for; else what is to be said about them."""
         if self.constants == "marginal":
             return marginal(chain, solver, outcome, self.max_iterations, self.tolerance)
-        told = [outcome.details.get("remark"), remark(chain, solver, outcome.covariance)]
-        said = "; ".join(filter(None, told))
+        remarks = [outcome.details.get("remark"), bias_message(chain, solver, outcome.covariance)]
+        said = "; ".join(filter(None, remarks))
         return replace(outcome, details=outcome.details | {"remark": said}) if said else outcome
 
     @property
@@ -166,7 +166,7 @@ class FactorGraph:
         name = name if self._bank is None else "ekf"
         applies = BorderedSolver.applies(problem)
         if self.solver == "bordered" and not applies:
-            raise ValueError(f"solver 'bordered' cannot be used: {RESTLESS}")
+            raise ValueError(f"solver 'bordered' cannot be used: {NOT_BORDERED}")
         bordered = self.solver == "bordered" or (self.solver == "auto" and applies and bool(problem.model.constants))
         solver: Solver = BorderedSolver(chain) if bordered else CovarianceSolver(chain)
         wide = False
@@ -177,7 +177,7 @@ class FactorGraph:
             start = waiting.pop(0)
             states, wrong = self._begin(start, chain.problem, tracking, inputs)
             doubtful = doubtful or wrong
-            outcome = descend(
+            outcome = minimize(
                 chain,
                 solver,
                 with_first(chain, states),
@@ -195,27 +195,27 @@ class FactorGraph:
         outcome, used = _together(tried), ", then ".join(start for start, _ in tried)
         for start in self._others(chain, doubtful, tried[-1][0]) if not outcome.failure else ():
             states, _ = self._begin(start, chain.problem, tracking, inputs)
-            outcome, better = self._challenge(chain, solver, outcome, with_first(chain, states))
+            outcome, better = self._or_better(chain, solver, outcome, with_first(chain, states))
             used = start if better else used
         return outcome, solver, used
 
     def _others(self, chain: Chain, doubtful: bool, used: str) -> Iterator[str]:
         """Where else to begin, for as long as the solution may not be the best."""
         for start in ("window", "prior") if isinstance(chain, RobustChain) else ("prior",):
-            if start != used and (chain.disowns if isinstance(chain, RobustChain) else doubtful):
+            if start != used and (chain.mostly_rejects if isinstance(chain, RobustChain) else doubtful):
                 yield start
 
-    def _challenge(self, chain: Chain, solver: Solver, outcome: Outcome, states: Array) -> tuple[Outcome, bool]:
+    def _or_better(self, chain: Chain, solver: Solver, outcome: Outcome, states: Array) -> tuple[Outcome, bool]:
         """The outcome, or that from other states where its cost is lower, and whether it is; the chain is left there."""
         x = chain.x.copy()
-        other = descend(chain, solver, states, min(self.max_iterations, CHALLENGE), self.tolerance)
+        other = minimize(chain, solver, states, min(self.max_iterations, MAX_SECOND), self.tolerance)
         if not other.failure and other.details["cost"] < outcome.details["cost"] - 1e-6:
             spent = outcome.iterations + other.iterations
             if "remark" in other.details:  # on the way to the better one, which deserves as many iterations as the first
-                other = descend(chain, solver, chain.x.copy(), self.max_iterations, self.tolerance)
+                other = minimize(chain, solver, chain.x.copy(), self.max_iterations, self.tolerance)
                 spent += other.iterations
             return replace(other, iterations=spent), True
-        stand(chain, solver, x)
+        solve_at(chain, solver, x)
         return outcome, False
 
     def _begin(self, start: str, problem: Problem, tracking: Tracking, inputs: Inputs) -> tuple[Array, bool]:
@@ -256,7 +256,7 @@ def _together(tried: list[tuple[str, Outcome]]) -> Outcome:
 
 def _too_wide(outcome: Outcome, solver: str) -> Outcome:
     """The outcome for a prior too wide for covariances where they must be used."""
-    way = "choose solver='auto'" if solver == "chain" else RESTLESS
+    way = "choose solver='auto'" if solver == "chain" else NOT_BORDERED
     return replace(outcome, failure=f"{TOO_WIDE} beside the noise of the measurements: {way}")
 
 

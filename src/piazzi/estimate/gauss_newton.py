@@ -15,10 +15,10 @@ from piazzi.estimate.width import TOO_WIDE
 from piazzi.problem.checks import Array
 
 FIRST_DAMPING, LARGEST_DAMPING = 1e-4, 1e12
-NEARLY, ROUGHLY = 3e-3, 10.0  # steps below so much of a sigma may be rounding, within so many times its estimate
+SMALL_STEP, ROUNDING_FACTOR = 3e-3, 10.0  # steps below so much of a sigma may be rounding, within so many times its estimate
 PARTS = (0.5, 0.25, 0.125)  # of a step near a solution, where the whole goes too far
-GRADED = 1e-3  # sigma: as good as converged for any use, and worth a remark
-AMPLIFIED = 1e3  # times the last bits of the states: steps beyond that are none of rounding, which is dear to estimate
+ACCEPTABLE = 1e-3  # sigma: as good as converged for any use, and worth a remark
+MOST_AMPLIFIED = 1e3  # times the last bits of the states: steps beyond that are none of rounding, which is dear to estimate
 SHRINKING = 0.05  # of the step before, or less: what a step near a solution is, unless it is rounding or converges slowly
 
 
@@ -39,7 +39,7 @@ def optimize(
 
     Measurements count too because a combination of states can be known much better than each of them; where steps shrink
     slowly, what counts is where they lead (`Extrapolation`).  Small steps that do not shrink much and are no larger than what
-    rounding of the states makes of them end the iterations as well, and iterations that are spent within `GRADED` standard
+    rounding of the states makes of them end the iterations as well, and iterations that are spent within `ACCEPTABLE` standard
     deviations of the end are a success with a remark.
     A step that raises the merit is damped as much as it takes (Levenberg-Marquardt, scaled by the prior), except the first.
     The merit is the cost under the process noise that the step was solved with, and for directions without noise, where the
@@ -60,8 +60,8 @@ def optimize(
         size = _size(chain)
         ahead = past.step(chain, size)
         at_rounding = _at_rounding(chain, solver, size, before, tolerance)
-        if isfinite(cost) and (at_rounding or _far(chain, size, ahead) <= tolerance):
-            covariance = _ended(chain, solver, ahead, NEARLY if at_rounding else tolerance)
+        if isfinite(cost) and (at_rounding or _distance(chain, size, ahead) <= tolerance):
+            covariance = _ended(chain, solver, ahead, SMALL_STEP if at_rounding else tolerance)
             if covariance is not None:
                 failure, stopped = "", "steps are rounding" if at_rounding else f"no step above {tolerance:g} sigma"
                 break
@@ -76,8 +76,8 @@ def optimize(
         failure += _weakest(chain)
         solver.solve(0.0)
         size = _size(chain)
-        off = _far(chain, size, past.step(chain, size))
-        if off <= GRADED and isfinite(cost):
+        off = _distance(chain, size, past.step(chain, size))
+        if off <= ACCEPTABLE and isfinite(cost):
             details, stopped, failure = {"remark": f"found to {off:.1g} sigma only: {failure}"}, failure, ""
     covariance = solver.marginals() if covariance is None else covariance
     return Outcome(covariance, iteration, failure, _figures(chain, solver, costs) | {"stopped": failure or stopped} | details)
@@ -94,15 +94,19 @@ def _ended(chain: Chain, solver: Solver, ahead: Array | None, tolerance: float) 
     return covariance
 
 
-def _far(chain: Chain, size: float, ahead: Array | None) -> float:
+def _distance(chain: Chain, size: float, ahead: Array | None) -> float:
     """How far the solution may be, in the measure of `_size`."""
     return size if ahead is None else max(size, _measured(chain, ahead))
 
 
 def _at_rounding(chain: Chain, solver: Solver, size: float, before: float, tolerance: float) -> bool:
     """Whether a step of this size is nothing but rounding."""
-    stuck = NEARLY > size > max(SHRINKING * before, tolerance) and not chain.reweighted
-    return stuck and size <= AMPLIFIED * _measured(chain, _last_bits(chain)) and size <= ROUGHLY * _rounding(chain, solver)
+    stuck = SMALL_STEP > size > max(SHRINKING * before, tolerance) and not chain.reweighted
+    return (
+        stuck
+        and size <= MOST_AMPLIFIED * _measured(chain, _last_bits(chain))
+        and size <= ROUNDING_FACTOR * _rounding(chain, solver)
+    )
 
 
 def _size(chain: Chain) -> float:

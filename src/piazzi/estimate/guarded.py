@@ -80,9 +80,9 @@ class GuardedLiveFilter(LiveFilter):
         self.rejected = False
 
     def predict(self, t: float) -> None:
-        stood = self._predicted_to
+        before = self._predicted_to
         super().predict(t)
-        if t != stood:
+        if t != before:
             self._values, self._rows_of = self._values[:0], self._rows_of[:0]
 
     def update(self, station: str, z: Any, t: float | None = None) -> None:
@@ -110,13 +110,13 @@ class GuardedLiveFilter(LiveFilter):
         self.innovation[:], self.innovation_covariance[:] = innovations.nu[-1], innovations.S[-1]
         self.rejected, self._measured = bool(gate.rejected[-1]), True
 
-    def _kept(self) -> dict[str, Array]:
-        return super()._kept() | {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
+    def _saved_state(self) -> dict[str, Array]:
+        return super()._saved_state() | {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
 
     def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
         values, rows_of = Saved(saved, self.problem).measurements("epoch_values", "epoch_stations")
         return super()._checked(saved) | {"epoch_values": values, "epoch_stations": rows_of}
 
-    def _take(self, kept: Mapping[str, Array]) -> None:
-        super()._take(kept)
+    def _set_state(self, kept: Mapping[str, Array]) -> None:
+        super()._set_state(kept)
         self._values, self._rows_of = kept["epoch_values"], kept["epoch_stations"]

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from piazzi.estimate.bank import believing, log_determinant, root
+from piazzi.estimate.bank import log_determinant, root, with_prior
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
 from piazzi.estimate.gauss_newton import Outcome
-from piazzi.estimate.robust import RobustChain, chain_for, descend, stand
+from piazzi.estimate.robust import RobustChain, chain_for, minimize, solve_at
 from piazzi.problem.checks import Array
 
 STEP = 0.1  # sigma of the constants, for differences
@@ -42,17 +42,17 @@ def shift(chain: Chain, solver: Solver, covariance: Array) -> Array:
     for j, states in enumerate(away):  # which follow one sigma of a combination of the constants
         above, below = (_log_determinant(chain, solver, x + side * STEP * states) for side in (1.0, -1.0))
         slope[j] = (above - below) / (2 * STEP)
-    stand(chain, solver, x)
+    solve_at(chain, solver, x)
     return np.asarray(A @ (-0.5 * slope))
 
 
 def _log_determinant(chain: Chain, solver: Solver, states: Array) -> float:
     """That of the states' information over their prior's, given the constants; up to a constant."""
-    stand(chain, solver, states)
+    solve_at(chain, solver, states)
     return log_determinant(chain) + float(np.linalg.slogdet(solver.of_constants())[1])
 
 
-def remark(chain: Chain, solver: Solver, covariance: Array) -> str:
+def bias_message(chain: Chain, solver: Solver, covariance: Array) -> str:
     """What is to be said about the constants of a joint mode, "" where they agree with the marginal ones."""
     moved, names = shift(chain, solver, covariance), chain.problem.model.constants
     sigmas = moved / np.sqrt(np.diagonal(covariance[-1])[-len(moved) :])
@@ -76,16 +76,16 @@ def marginal(chain: Chain, solver: Solver, outcome: Outcome, max_iterations: int
         before, S = chain.x[-1, c].copy(), covariance[-1][c, c]
         slope = -np.linalg.solve(S, shift(chain, solver, covariance))
         mean = problem.mean - problem.covariance[:, c] @ slope
-        led = chain_for(believing(problem, np.ascontiguousarray(mean), problem.covariance), chain.inputs, loss)
-        found = descend(led, type_of(solver)(led), chain.x.copy(), max_iterations, tolerance)
+        shifted = chain_for(with_prior(problem, np.ascontiguousarray(mean), problem.covariance), chain.inputs, loss)
+        found = minimize(shifted, type_of(solver)(shifted), chain.x.copy(), max_iterations, tolerance)
         iterations += found.iterations
         if found.failure:
             return replace(outcome, iterations=iterations, failure=f"for the marginal mode of the constants: {found.failure}")
-        stand(chain, solver, led.x)
+        solve_at(chain, solver, shifted.x)
         covariance = solver.marginals()
         if (np.abs(chain.x[-1, c] - before) <= SETTLED * np.sqrt(np.diag(S))).all():
             return replace(outcome, covariance=covariance, iterations=iterations)
-    return replace(outcome, iterations=iterations, failure="the marginal mode of the constants does not settle")
+    return replace(outcome, iterations=iterations, failure="the marginal mode of the constants does not converge")
 
 
 def type_of(solver: Solver) -> type[BorderedSolver] | type[CovarianceSolver]:

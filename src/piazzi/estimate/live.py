@@ -11,7 +11,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.saved import Saved
 from piazzi.estimate.session import Session
-from piazzi.estimate.width import told
+from piazzi.estimate.width import too_wide_message
 from piazzi.kernels.bundle import Belief, Innovations
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, check_span
@@ -89,8 +89,8 @@ def checked_measurement(problem: Problem, stations: Mapping[str, int], station: 
 
 def clock_times(clock: Array) -> tuple[float | None, float | None]:
     """The first two numbers of a checkpoint's clock, None for NaN."""
-    before, stands = (None if np.isnan(v) else float(v) for v in clock[:2])
-    return before, stands
+    before, now = (None if np.isnan(v) else float(v) for v in clock[:2])
+    return before, now
 
 
 class LiveFilter(Session):
@@ -206,22 +206,22 @@ class LiveFilter(Session):
     # ---- what it stands on ---------------------------------------------------------------------------------------
 
     @property
-    def _stands(self) -> float | None:
+    def _belief_time(self) -> float | None:
         return self.time
 
     def _beliefs(self) -> list[tuple[Array, Array]]:
         predicted = (self._base_mean, self._base_covariance), (self._x_pred, self._P_pred)
         return [(self.mean, self.covariance), *predicted, (self._d, self._P)]
 
-    def _doubt(self) -> str:
-        return told(self.widest)
+    def _why_unusable(self) -> str:
+        return too_wide_message(self.widest)
 
-    def _kept(self) -> dict[str, Array]:
-        stand = [np.nan if v is None else v for v in (self._clock.time, self._predicted_to)]
+    def _saved_state(self) -> dict[str, Array]:
+        clock = [np.nan if v is None else v for v in (self._clock.time, self._predicted_to)]
         return {name: getattr(self, "_" + name).copy() for name in _KEPT} | {
             "mean": self.mean.copy(),
             "covariance": self.covariance.copy(),
-            "clock": np.array([*stand, float(self._measured)]),
+            "clock": np.array([*clock, float(self._measured)]),
         }
 
     def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
@@ -230,7 +230,7 @@ class LiveFilter(Session):
         found = {name: checked.mean(name) for name in vectors} | {name: checked.covariance(name) for name in matrices}
         return found | {"times": checked.array("times", 4), "clock": checked.clock("clock", 3)}
 
-    def _take(self, kept: Mapping[str, Array]) -> None:
+    def _set_state(self, kept: Mapping[str, Array]) -> None:
         for name in (*_KEPT, "mean", "covariance"):
             getattr(self, name if name in ("mean", "covariance") else "_" + name)[...] = kept[name]
         self._clock.time, self._predicted_to = clock_times(kept["clock"])

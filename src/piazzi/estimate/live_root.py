@@ -127,16 +127,16 @@ class LiveRootFilter(Session):
     # ---- what it stands on ---------------------------------------------------------------------------------------
 
     @property
-    def _stands(self) -> float | None:
+    def _belief_time(self) -> float | None:
         return self.time
 
     def _beliefs(self) -> list[tuple[Array, Array]]:
         return [(self.mean, self.covariance), (self.base_mean, self.covariance)]  # roots are of semidefinite ones
 
-    def _kept(self) -> dict[str, Array]:
-        stand = [np.nan if v is None else v for v in (self._clock.time, self.time)]
+    def _saved_state(self) -> dict[str, Array]:
+        clock = [np.nan if v is None else v for v in (self._clock.time, self.time)]
         rows = {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
-        return {name: getattr(self, name).copy() for name in self._arrays} | rows | {"clock": np.array(stand)}
+        return {name: getattr(self, name).copy() for name in self._arrays} | rows | {"clock": np.array(clock)}
 
     def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
         checked, n = Saved(saved, self.problem), self.problem.model.n
@@ -146,7 +146,7 @@ class LiveRootFilter(Session):
         rows = {"epoch_values": values, "epoch_stations": rows_of}
         return found | rows | {"covariance": checked.covariance("covariance"), "clock": checked.clock("clock", 2)}
 
-    def _take(self, kept: Mapping[str, Array]) -> None:
+    def _set_state(self, kept: Mapping[str, Array]) -> None:
         for name in self._arrays:
             setattr(self, name, kept[name])
         self._values, self._rows_of = kept["epoch_values"], kept["epoch_stations"]

@@ -15,7 +15,7 @@ from piazzi.estimate.robust_window import loss_numbers, window_fragments
 from piazzi.estimate.saved import MOST_STEPS, Saved, check_order, check_steps
 from piazzi.estimate.session import Session
 from piazzi.estimate.stretch import Stretch
-from piazzi.estimate.width import told
+from piazzi.estimate.width import too_wide_message
 from piazzi.kernels.bundle import Belief, Chain, Innovations, Interval, Run, Window
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Gaussian, Problem
@@ -107,9 +107,9 @@ class LiveWindow(Session):
         self.mean, self.covariance = (a.copy() for a in self._newest)
         self._pending = t
         if now is not None and dt > 0:
-            self._carry(now, dt, self.mean, self.covariance)
+            self._predict_belief(now, dt, self.mean, self.covariance)
 
-    def _carry(self, now: float, dt: float, mean: Array, covariance: Array) -> None:
+    def _predict_belief(self, now: float, dt: float, mean: Array, covariance: Array) -> None:
         """Predict a belief in place."""
         p, (count, scale) = self.problem, self._clock.step(dt)
         Q = p.process_noise.covariance
@@ -144,14 +144,14 @@ class LiveWindow(Session):
         window.add_row(k, self._row, s)
         self._solve_newest(late=k < window.stop - 1)
         if k < window.stop - 1:
-            self._note_width(k)
+            self._record_variance_ratio(k)
         return True
 
     def _begin(self, t: float) -> None:
         """First epoch: the prior, carried there."""
         dt, window = self._clock.interval(t), self._window
         if dt > 0:
-            self._carry(t - dt, dt, self._m, self._P)
+            self._predict_belief(t - dt, dt, self._m, self._P)
         k = window.open_epoch(window.stop, t, 1, 0.0)
         window.x[k] = window.x_before[k] = self._m
 
@@ -160,15 +160,15 @@ class LiveWindow(Session):
         window = self._window
         dt = self._clock.interval(t, float(window.t[window.stop - 1]))
         self._predict_state(window.open_epoch(window.stop, t, *self._clock.step(dt)))
-        stays = self._stays()
-        if stays > window.first:
-            self._span[:] = window.first, stays
+        oldest = self._oldest_kept()
+        if oldest > window.first:
+            self._span[:] = window.first, oldest
             self._marginalize()
-            window.first = stays
-        window.x_before[stays : window.stop] = window.x[stays : window.stop]
+            window.first = oldest
+        window.x_before[oldest : window.stop] = window.x[oldest : window.stop]
 
-    def _stays(self) -> int:
-        """The oldest epoch that stays in the window."""
+    def _oldest_kept(self) -> int:
+        """The oldest epoch that is still in the window."""
         window = self._window
         if self.lag_seconds is None:
             return max(window.first, window.stop - self.lag)
@@ -209,7 +209,7 @@ class LiveWindow(Session):
             self.innovation.fill(np.nan)
             self.innovation_covariance.fill(np.nan)
 
-    def _note_width(self, k: int) -> None:
+    def _record_variance_ratio(self, k: int) -> None:
         """Keep the largest predicted variance, in units of its noise, of rows of an older epoch: they have no innovations."""
         window, (nu, H, _) = self._window, self._linear
         first = window.first_row[window.first]
@@ -276,7 +276,7 @@ class LiveWindow(Session):
     # ---- checkpoints ---------------------------------------------------------------------------------------------
 
     @property
-    def _stands(self) -> float | None:
+    def _belief_time(self) -> float | None:
         return self.time if self._pending is None else self._pending
 
     def _beliefs(self) -> list[tuple[Array, Array]]:
@@ -285,10 +285,10 @@ class LiveWindow(Session):
             found += [(window.x[window.first], self._oldest_covariance[window.first])]
         return found + [(x, self.covariance) for x in window.x[window.first : window.stop]]
 
-    def _doubt(self) -> str:
-        return told(self.widest)
+    def _why_unusable(self) -> str:
+        return too_wide_message(self.widest)
 
-    def _kept(self) -> dict[str, Array]:
+    def _saved_state(self) -> dict[str, Array]:
         window, out = self._window, {"m": self._m.copy(), "P": self._P.copy(), **self._window.copied()}
         W, J, m = len(window), window.rows, self.problem.model.width
         if W:
@@ -341,7 +341,7 @@ class LiveWindow(Session):
             found["oldest_covariance"] = checked.covariance("oldest_covariance")
         return found
 
-    def _take(self, kept: Mapping[str, Array]) -> None:
+    def _set_state(self, kept: Mapping[str, Array]) -> None:
         self._m, self._P = kept["m"].copy(), kept["P"].copy()
         self._window = Stretch.of(self.problem.model.n, self.problem.model.width, kept)
         self.mean, self.covariance = kept["mean"], kept["covariance"]

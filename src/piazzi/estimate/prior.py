@@ -34,18 +34,18 @@ def with_prior_at(problem: Problem, t: float) -> Problem:
         that of the states; and where the noise of the gap is not small beside the prior (its correlation with the moved
         prior's error would be lost, and standard deviations could be off by more than 1 %).
     """
-    stands = problem.prior_time
-    if stands is None or stands <= t:
+    prior_time = problem.prior_time
+    if prior_time is None or prior_time <= t:
         return problem
-    where = f"the prior at {stands:g} s cannot be propagated back to the first measurement at {t:g} s"
+    where = f"the prior at {prior_time:g} s cannot be propagated back to the first measurement at {t:g} s"
     if problem.model.discrete or problem.model.memory:
         raise ValueError(
             f"{where}: the model is a step or has memories, so it cannot run backwards; give an earlier prior time"
         )
-    check_after(problem.manoeuvres, stands)
-    x, step = _start(problem, float(t), float(stands - t), where)
+    check_after(problem.manoeuvres, prior_time)
+    x, step = _start(problem, float(t), float(prior_time - t), where)
     P = _moved_covariance(problem, step, where)
-    _check_parameters(problem, x, P, float(t), float(stands - t), where)
+    _check_parameters(problem, x, P, float(t), float(prior_time - t), where)
     states = len(problem.model.states)
     own = {name: Gaussian([x[i]], [[P[i, i]]]) for i, name in enumerate(problem.model.constants, start=states)}
     prior = Gaussian(x[:states], P[:states, :states])

@@ -18,11 +18,11 @@ from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs
 
 # how far, and how often, a loss is followed that only leads to the next
-ROUGH, ROUGHLY = 1e-2, 15
+HUBER_TOLERANCE, HUBER_ITERATIONS = 1e-2, 15
 # reweighting converges linearly, where Gauss-Newton alone is nearly quadratic
-LONGER = 4
-# mean weight below which a solution may be one that disowns the measurements: on Gaussian noise it is 0.87 to 0.96
-DISOWNED = 0.8
+REWEIGHTED_FACTOR = 4
+# mean weight below which a solution may be one that rejects most measurements: on Gaussian noise it is 0.87 to 0.96
+LOW_WEIGHT = 0.8
 # share of good measurements that the filter behind a start takes
 GATE = 0.999
 
@@ -58,10 +58,10 @@ class RobustChain(Chain):
         return 0.5 * float(self.report[: PRIOR + 1].sum())
 
     @property
-    def disowns(self) -> bool:
+    def mostly_rejects(self) -> bool:
         """Whether so many rows are weighted down that these may be the good ones."""
         measured = self._components > 0
-        return bool(self.weights[measured].mean() < DISOWNED)
+        return bool(self.weights[measured].mean() < LOW_WEIGHT)
 
 
 def chain_for(problem: Problem, inputs: Inputs, loss: Loss | None) -> Chain:
@@ -74,7 +74,7 @@ def gated_run(problem: Problem, inputs: Inputs) -> Array:
     return guarded_run(problem, inputs, update_fragments(problem, "auto"), Guard(1, GATE))[0]
 
 
-def stand(chain: Chain, solver: Solver, states: Array) -> None:
+def solve_at(chain: Chain, solver: Solver, states: Array) -> None:
     """Leave the chain at `states` (K, n), linearised and solved there."""
     chain.x[:] = states
     if np.isfinite(states).all():
@@ -85,7 +85,7 @@ def stand(chain: Chain, solver: Solver, states: Array) -> None:
         chain.P_pred.fill(np.nan)
 
 
-def descend(
+def minimize(
     chain: Chain,
     solver: Solver,
     start: Array,
@@ -101,23 +101,25 @@ def descend(
     if not isinstance(chain, RobustChain):
         return optimize(chain, solver, start, max_iterations, tolerance, widest)
     if isinstance(chain.loss, Huber):
-        return optimize(chain, solver, start, LONGER * max_iterations, tolerance, widest)
+        return optimize(chain, solver, start, REWEIGHTED_FACTOR * max_iterations, tolerance, widest)
     wanted, chain.loss = chain.loss, Huber()
-    first = optimize(chain, solver, start, min(ROUGHLY, max_iterations), ROUGH, widest)
+    first = optimize(chain, solver, start, min(HUBER_ITERATIONS, max_iterations), HUBER_TOLERANCE, widest)
     chain.loss = wanted
     if first.failure == TOO_WIDE:
         return first
-    last = optimize(chain, solver, chain.x.copy(), LONGER * max_iterations, tolerance)
-    led = replace(last, iterations=first.iterations + last.iterations)
-    return _or_directly(chain, solver, start, LONGER * max_iterations, tolerance, led) if direct else led
+    last = optimize(chain, solver, chain.x.copy(), REWEIGHTED_FACTOR * max_iterations, tolerance)
+    indirect = replace(last, iterations=first.iterations + last.iterations)
+    return _or_from_start(chain, solver, start, REWEIGHTED_FACTOR * max_iterations, tolerance, indirect) if direct else indirect
 
 
-def _or_directly(chain: Chain, solver: Solver, start: Array, max_iterations: int, tolerance: float, led: Outcome) -> Outcome:
-    """The outcome `led`, at which the chain stands, or that from `start` itself where cheaper; the chain is left there."""
+def _or_from_start(
+    chain: Chain, solver: Solver, start: Array, max_iterations: int, tolerance: float, indirect: Outcome
+) -> Outcome:
+    """The outcome `indirect`, at which the chain stands, or that from `start` itself where cheaper; the chain is left there."""
     states = chain.x.copy()
     own = optimize(chain, solver, start, max_iterations, tolerance)
-    iterations = led.iterations + own.iterations
-    if not own.failure and (led.failure or own.details["cost"] < led.details["cost"]):
+    iterations = indirect.iterations + own.iterations
+    if not own.failure and (indirect.failure or own.details["cost"] < indirect.details["cost"]):
         return replace(own, iterations=iterations)
-    stand(chain, solver, states)
-    return replace(led, iterations=iterations)
+    solve_at(chain, solver, states)
+    return replace(indirect, iterations=iterations)

@@ -30,7 +30,7 @@ class Session(ABC):
 
     @property
     @abstractmethod
-    def _stands(self) -> float | None:
+    def _belief_time(self) -> float | None:
         """Time that the beliefs are for."""
 
     @abstractmethod
@@ -38,7 +38,7 @@ class Session(ABC):
         """Every mean (n,) with its covariance (n, n) that the next call depends on, that to be read first."""
 
     @abstractmethod
-    def _kept(self) -> dict[str, Array]:
+    def _saved_state(self) -> dict[str, Array]:
         """Copies of everything that the next call depends on."""
 
     @abstractmethod
@@ -46,7 +46,7 @@ class Session(ABC):
         """The same, out of what may be anything; raises ValueError where it does not fit."""
 
     @abstractmethod
-    def _take(self, kept: Mapping[str, Array]) -> None:
+    def _set_state(self, kept: Mapping[str, Array]) -> None:
         """Go on from there."""
 
     @property
@@ -56,12 +56,12 @@ class Session(ABC):
     @property
     def message(self) -> str:
         means, covariances = zip(*self._beliefs(), strict=True)
-        t = self._stands
+        t = self._belief_time
         place = "" if t is None else f"at t = {t:g} s"
         found = defect(np.array(means), np.array(covariances), self.problem.model.names, lambda k: place).rstrip()
-        return found or self._doubt()
+        return found or self._why_unusable()
 
-    def _doubt(self) -> str:
+    def _why_unusable(self) -> str:
         """Why beliefs that look good cannot be used, "" where they can."""
         return ""
 
@@ -75,21 +75,21 @@ class Session(ABC):
         """
         if not self.success:
             raise ValueError(self.message)
-        kept = self._kept()
+        kept = self._saved_state()
         self._checked(kept)
         return kept
 
     def restore(self, saved: Mapping[str, Array]) -> None:
         """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
-        self._take(self._checked(saved))
+        self._set_state(self._checked(saved))
 
     def __reduce__(self) -> tuple[Any, ...]:
         shown = {name: copy.copy(getattr(self, name)) for name in self._shown}
-        return type(self), (self.problem, *self._settings), (self._kept(), shown)
+        return type(self), (self.problem, *self._settings), (self._saved_state(), shown)
 
     def __setstate__(self, state: tuple[dict[str, Array], dict[str, Any]]) -> None:
         kept, shown = state
-        self._take(kept)
+        self._set_state(kept)
         for name, value in shown.items():
             if isinstance(value, np.ndarray):
                 getattr(self, name)[...] = value  # where kernels write to

@@ -16,7 +16,7 @@ from piazzi.estimate.live_window import LiveWindow, window_opens
 from piazzi.estimate.losses import loss_of
 from piazzi.estimate.robust_window import loss_numbers, window_fragments
 from piazzi.estimate.stopwatch import Stopwatch
-from piazzi.estimate.width import RESTLESS, TOO_WIDE, last_wide, too_wide
+from piazzi.estimate.width import NOT_BORDERED, TOO_WIDE, last_wide, too_wide
 from piazzi.kernels.bundle import Beliefs, Chain, Innovations, Window
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
@@ -154,7 +154,7 @@ class SlidingWindow:
         from piazzi.estimate.root import linear_root, root_estimate
 
         if self.loss is not None or not BorderedSolver.applies(problem):
-            why = LOSSY if self.loss is not None else RESTLESS
+            why = LOSSY if self.loss is not None else NOT_BORDERED
             return run, f"{TOO_WIDE} beside the noise of the measurements: {why}", "chain"
         forward = root_estimate(linear_root(), problem, tracking)
         open_until = last_wide(problem, inputs, forward.innovation_covariances)

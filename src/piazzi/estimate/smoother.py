@@ -15,7 +15,7 @@ from piazzi.estimate.determined import undetermined
 from piazzi.estimate.estimator import Estimate, View
 from piazzi.estimate.kalman import check_start
 from piazzi.estimate.stopwatch import Stopwatch
-from piazzi.estimate.width import RESTLESS, TOO_WIDE, too_wide
+from piazzi.estimate.width import NOT_BORDERED, TOO_WIDE, too_wide
 from piazzi.kernels.bundle import Chain, Innovations, Smoothed
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
@@ -83,12 +83,12 @@ class Smoother:
         details: dict[str, Any] = {"solver": "bordered"}
         K = inputs.epochs
         if not BorderedSolver.applies(problem):
-            failure = f"{TOO_WIDE} beside the noise of the measurements: {RESTLESS}"
+            failure = f"{TOO_WIDE} beside the noise of the measurements: {NOT_BORDERED}"
             return Estimate(
                 problem, tracking, forward.mean, forward.covariance, nu, S, K, watch.seconds(), "delayed", failure=failure
             )
         mean, covariance, cross = smoothed(problem, inputs, forward.mean)
         if self.cross_covariances:
             details["cross_covariances"] = cross
-        told = undetermined(problem, covariance[0], mean, covariance[-1])
-        return Estimate(problem, tracking, mean, covariance, nu, S, K, watch.seconds(), "delayed", None, details, told)
+        failure = undetermined(problem, covariance[0], mean, covariance[-1])
+        return Estimate(problem, tracking, mean, covariance, nu, S, K, watch.seconds(), "delayed", None, details, failure)

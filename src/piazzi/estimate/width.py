@@ -18,10 +18,10 @@ from piazzi.problem.inputs import Inputs
 # predicted over noise variance of one measurement beyond which a covariance keeps less than six digits of what is left
 DIFFUSE = 1e10
 TOO_WIDE = "the prior is too wide for covariances"
-RESTLESS = "the bordered form does not apply, because process noise or a manoeuvre moves an estimated constant"
+NOT_BORDERED = "the bordered form does not apply, because process noise or a manoeuvre moves an estimated constant"
 
 
-def told(widest: Array) -> str:
+def too_wide_message(widest: Array) -> str:
     """Why a live estimate on covariances cannot be used, "" unless a measurement had more than `DIFFUSE` times its noise."""
     way = "begin with SquareRootKalmanFilter().start(problem), or estimate the whole run"
     return f"{TOO_WIDE} beside the noise of the measurements: {way}" if widest[0] > DIFFUSE else ""

@@ -10,7 +10,7 @@ import numpy as np
 
 from piazzi.estimate import Estimator, ExtendedKalmanFilter, FactorGraph
 from piazzi.evaluate.bounds import full_truth, posterior_bounds
-from piazzi.evaluate.information import coast
+from piazzi.evaluate.information import propagated
 from piazzi.evaluate.metrics import rms_in_sigmas
 from piazzi.evaluate.quantities import finite
 from piazzi.evaluate.twins import Twin
@@ -80,4 +80,4 @@ def _orbits(problem: Problem, tracking: Tracking, twins: Sequence[Twin]) -> list
     """Where each twin is at the last epoch, (1, n)."""
     inputs = prepare(problem, tracking)
     unmeasured = replace(inputs, z=np.full_like(inputs.z, np.nan))
-    return [coast(problem, unmeasured, twin.state)[-1:] for twin in twins]
+    return [propagated(problem, unmeasured, twin.state)[-1:] for twin in twins]

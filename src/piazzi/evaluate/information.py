@@ -85,7 +85,7 @@ def from_first(problem: Problem, inputs: Inputs, first: Array) -> Shot:
     return _observe(problem, inputs, states, follow=True)
 
 
-def coast(problem: Problem, inputs: Inputs, first: Array) -> Array:
+def propagated(problem: Problem, inputs: Inputs, first: Array) -> Array:
     """States (K, n) of the orbit from this first state (n,), without process noise and without measurements."""
     return from_first(problem, replace(inputs, z=np.full_like(inputs.z, np.nan)), first).states
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.evaluate.information import coast, factor, from_first, predicted
+from piazzi.evaluate.information import factor, from_first, predicted, propagated
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs
@@ -167,7 +167,7 @@ def _drawn(problem: Problem, n: int) -> Iterator[Array]:
 def _noiseless(problem: Problem, inputs: Inputs, first: Array) -> Inputs | None:
     """The same run with the noiseless measurements of the orbit from `first`; None where that is not finite."""
     with np.errstate(all="ignore"):
-        z = predicted(problem, inputs, coast(problem, inputs, first))
+        z = predicted(problem, inputs, propagated(problem, inputs, first))
     z = np.where(np.isnan(inputs.z), np.nan, z)
     return replace(inputs, z=z) if np.isfinite(z[~np.isnan(inputs.z)]).all() else None
 

@@ -54,11 +54,11 @@ def compile_entries(source: str) -> tuple[dict[str, bytes], dict[str, tuple[str,
     except UNKNOWN_INSIDE:
         raise
     except Exception as error:
-        tell_of_source(source, error)
+        note_source(source, error)
         raise
 
 
-def tell_of_source(source: str, error: Exception) -> None:
+def note_source(source: str, error: Exception) -> None:
     """Keep a source in the folder for temporary files, and name it in the error."""
     try:
         with tempfile.NamedTemporaryFile("w", prefix="failed-", suffix=".py", delete=False) as copy:

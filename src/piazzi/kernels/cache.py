@@ -15,7 +15,7 @@ from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
-from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, live_entries, plain_entries, tell_of_source
+from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, live_entries, note_source, plain_entries
 from piazzi.kernels.folder import Folder, private_folder, writable_folder
 from piazzi.kernels.library import load_objects
 from piazzi.kernels.names import FRAGMENTS
@@ -148,7 +148,7 @@ def _built_publicly(source: str, sizes: Mapping[str, int], error: Exception) -> 
     try:
         entries = live_entries(source, sizes)
     except Exception:
-        tell_of_source(source, error)
+        note_source(source, error)
         raise error from None
     _warn_of_numba(f"{type(error).__name__}: {error}")
     return dict(entries)

@@ -48,7 +48,7 @@ class Integrator:
     @property
     def fragments(self) -> tuple[str, ...]:
         """The kernel fragments that carry a state over an interval with this method's step."""
-        return ("coast_steps",)
+        return ("arc_steps",)
 
     @property
     def noise_fragments(self) -> tuple[str, ...]:
@@ -159,7 +159,7 @@ class DormandPrince(Integrator):
 
     @property
     def fragments(self) -> tuple[str, ...]:
-        return ("coast_adaptive",)
+        return ("arc_adaptive",)
 
     @property
     def noise_fragments(self) -> tuple[str, ...]:
@@ -233,7 +233,7 @@ class Kepler(Integrator):
 
     @property
     def fragments(self) -> tuple[str, ...]:
-        return ("kepler", "coast_once")
+        return ("kepler", "arc_once")
 
     @property
     def noise_fragments(self) -> tuple[str, ...]:

@@ -99,9 +99,9 @@ class Bundle:
             kind = self._kinds.get(tuple(shapes)) if len(shapes) == len(found) else None
         except TypeError:  # an array where a number should be
             kind = None
-        self._keep(found, self._judged(members, tuple(shapes)) if kind is None else kind)
+        self._keep(found, self._check(members, tuple(shapes)) if kind is None else kind)
 
-    def _judged(self, members: Mapping[str, Any], shapes: tuple[Any, ...]) -> Kind:
+    def _check(self, members: Mapping[str, Any], shapes: tuple[Any, ...]) -> Kind:
         """The kind of a bundle of these members, which is remembered by their shapes."""
         sizes: dict[str, int] = {}
         for member, slot in self.slots.items():

@@ -86,26 +86,26 @@ measure_row: Any
 innovate_row: Any
 measure_lanes: Any
 innovate_lanes: Any
-# written in fragments/coast_*.py, noise_*.py, axes*.py, transition*.py, update_*.py
-coast: Any
-coast_jacobian: Any
-coast_noise: Any
-carry_noise: Any
+# written in fragments/arc_*.py, noise_*.py, axes*.py, transition*.py, update_*.py
+propagate_arc: Any
+propagate_arc_jacobian: Any
+propagate_arc_noise: Any
+propagate_noise: Any
 combined_error: Any
 matrix_error: Any
 noise_in_axes: Any
 resized: Any
 manoeuvre: Any
-happens: Any
-share: Any
-travel: Any
+manoeuvre_within: Any
+substeps_for: Any
+propagate: Any
 transition: Any
 advance: Any
 symmetric: Any
-absorb: Any
+update_row: Any
 decorrelate: Any
 record: Any
-note_width: Any
+record_variance_ratio: Any
 update_epoch: Any
 # written in fragments/noise_*.py, linearize.py, chain.py
 linearize_dynamics: Any
@@ -117,22 +117,22 @@ forward: Any
 record_epoch: Any
 marginalize_oldest: Any
 solve_window: Any
-forward_following: Any
+forward_fixed_point: Any
 cancelled: Any
 Q_matrix: Any
 back_through_epoch: Any
 predict_deviation: Any
 backward: Any
-absorb_epoch: Any
+update_deviation: Any
 squared_innovation: Any
 update_epoch_guarded: Any
 # written in fragments/graph_linearize.py
 weigh_dynamics: Any
 # written in fragments/*_lanes.py
-travel_lanes: Any
+propagate_lanes: Any
 transition_lanes: Any
 ones: Any
-note_error: Any
+store_errors: Any
 squared_lanes: Any
 nees_lanes: Any
 # written in fragments/border.py
@@ -140,6 +140,6 @@ rotate: Any
 invert_upper: Any
 begin_border: Any
 advance_border: Any
-absorb_row: Any
+update_bordered: Any
 width_of_row: Any
 record_belief: Any

@@ -334,7 +334,7 @@ class Problem:
         return self.integrator.in_lanes and not self.manoeuvres
 
     @property
-    def runs_in_lanes(self) -> bool:
+    def runs_in_ensemble(self) -> bool:
         """Whether whole runs can advance together: where states can, with process noise that does not depend on them."""
         return self.moves_in_lanes and not self.noise_varies
 

@@ -9,7 +9,7 @@ import numpy as np
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.simulation import true_problem
-from piazzi.study.lanes import Layout, compiles, filter_runs
+from piazzi.study.ensemble import Layout, filter_runs
 from piazzi.study.plan import BOUND_RUNS, Plan
 from piazzi.study.runs import Runs, simulated
 from piazzi.study.tasks import Task
@@ -79,12 +79,9 @@ class _Mean:
 
 
 def _add(mean: _Mean, first: int, study: Plan, actual: Problem, runs: Runs, good: list[int], view: str) -> int:
-    """Add the bounds of truths to a mean; of how many: all in lanes, `SLOW_RUNS` in all one by one."""
-    layout = Layout(actual, study.times)
-    sample = runs.z[good[:1]], runs.truth[good[:1]]
-    if good and view == "realtime" and actual.runs_in_lanes and compiles(filter_runs, layout, *sample):
-        _, _, scores = filter_runs(layout, runs.z[good], runs.truth[good], at_truth=True)
-        assert scores is not None
+    """Add the bounds of truths to a mean; of how many: all of an ensemble, `SLOW_RUNS` in all one by one."""
+    if good and view == "realtime" and actual.runs_in_ensemble:
+        _, _, scores = filter_runs(Layout(actual, study.times), runs.z[good], runs.truth[good], at_truth=True)
         found = scores.spread.transpose(0, 2, 1)
     else:
         good = good[: SLOW_RUNS - mean.looked_at]

@@ -13,14 +13,14 @@ from piazzi.estimate.estimator import views_of
 from piazzi.estimate.width import DIFFUSE, prior_ratio
 from piazzi.problem import Problem
 from piazzi.study.bound import bound_at, no_bound
-from piazzi.study.lanes import compiles, filter_runs
+from piazzi.study.ensemble import filter_runs, library
 from piazzi.study.plan import Plan
 from piazzi.study.runs import Runs, simulated
-from piazzi.study.score import NUMBERS, Scored, empty_scores, score_estimate, score_lanes
+from piazzi.study.score import NUMBERS, Scored, empty_scores, score_ensemble, score_estimate
 from piazzi.study.tasks import Piece, Task, joined
 
 LOGGER = logging.getLogger("piazzi.study")
-_DOUBTFUL = 1e-9  # smallest pivot of a correlation matrix down to which elimination in lanes is as good as any
+_DOUBTFUL = 1e-9  # smallest pivot of a correlation matrix down to which elimination without pivots is as good as any
 
 
 def run_task(study: Plan, task: Task) -> Piece:
@@ -71,7 +71,7 @@ def _estimated(study: Plan, label: str, estimator: Any, runs: Runs) -> list[tupl
     M, G, T = len(runs.truth), len(study.groups), len(study.kept)
     found = [(empty_scores(M, G, T), list(runs.wrong)) for _ in views]
     left = [i for i in range(M) if not runs.wrong[i]]
-    if _filters_in_lanes(estimator, runs.assumed):
+    if _filters_in_ensemble(estimator, runs.assumed):
         left = _filter(study, runs, left, found[0][0])
     for i in left:
         for view, (scored, message) in _one(study, label, estimator, runs, i).items():
@@ -82,27 +82,24 @@ def _estimated(study: Plan, label: str, estimator: Any, runs: Runs) -> list[tupl
     return found
 
 
-def _filters_in_lanes(estimator: Any, assumed: Problem) -> bool:
+def _filters_in_ensemble(estimator: Any, assumed: Problem) -> bool:
     plain = type(estimator) is ExtendedKalmanFilter and estimator.guard is None and estimator.update != "joint"
-    return plain and assumed.runs_in_lanes and not assumed.considered and prior_ratio(assumed) <= DIFFUSE
+    return plain and assumed.runs_in_ensemble and not assumed.considered and prior_ratio(assumed) <= DIFFUSE
 
 
 def _filter(study: Plan, runs: Runs, left: list[int], out: Scored) -> list[int]:
     """Put the scores of the extended Kalman filter of these runs in place; returns the runs that need a closer look."""
     if not left:
         return []
-    layout = runs.assumed_layout
-    if not compiles(filter_runs, layout, runs.z[left[:1]], runs.truth[left[:1]]):
-        return left
     whole = len(left) == len(runs.truth)
     z, truth = (runs.z, runs.truth) if whole else (runs.z[left], runs.truth[left])
+    library(runs.assumed)  # what is built once is no part of a run's time
     started = time.perf_counter()
-    mean, _, scores = filter_runs(layout, z, truth)
+    mean, _, scores = filter_runs(runs.assumed_layout, z, truth)
     seconds = time.perf_counter() - started
-    assert scores is not None
     sound = np.isfinite(mean).all(axis=1) & np.isfinite(scores.nees).all(axis=1) & np.isfinite(scores.nis).all(axis=1)
     sound &= scores.lowest > _DOUBTFUL
-    scored = score_lanes(scores, runs.assumed.model.n, study.kept, seconds)
+    scored = score_ensemble(scores, runs.assumed.model.n, study.kept, seconds)
     if whole and sound.all():
         _copy(scored, slice(None), out, slice(None))
         return []

@@ -1,4 +1,4 @@
-"""What is random about runs, children of the seed of a study; their truths and measurements, in lanes where possible."""
+"""What is random about runs, children of the seed of a study; their truths and measurements, as an ensemble where possible."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from piazzi.problem import Problem, Tracking, Truth
 from piazzi.problem.checks import Array
 from piazzi.simulation import MOST_DRAWS, NoTruthError, Rule, check_finite, placed, propagate, true_problem
-from piazzi.study.lanes import Layout, compiles, simulate_runs
+from piazzi.study.ensemble import Layout, simulate_runs
 from piazzi.study.plan import Plan
 from piazzi.study.tasks import Task
 
@@ -47,7 +47,7 @@ def simulated(study: Plan, task: Task) -> Runs:
     world, assumed, actual, layout, assumed_layout = _at_point(study, task.point)
     draws = draw(world, actual, task.runs, study.seed, len(study.times))
     noisy = world.truth is None or world.truth.measurement_noise
-    if actual.runs_in_lanes and compiles(simulate_runs, layout, actual, draws.first[:1], draws.w[:1], draws.v[:1], noisy):
+    if actual.runs_in_ensemble:
         truth, z = simulate_runs(layout, actual, draws.first, draws.w, draws.v, noisy)
     else:
         truth, z = _one_by_one(world, actual, study.times, draws, noisy)

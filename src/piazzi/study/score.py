@@ -1,4 +1,4 @@
-"""Scores of runs: of many in lanes at once, and of one estimate, alike."""
+"""Scores of runs: of an ensemble at once, and of one estimate, alike."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from piazzi.estimate.chi_square import quantile
 from piazzi.evaluate.metrics import FAR, errors, known_truth, not_decreasing, squared_in_sigmas
 from piazzi.evaluate.rows import evaluate
 from piazzi.problem.checks import Array
-from piazzi.study.lanes import Scores
+from piazzi.study.ensemble import Scores
 
 # name -> whether there is one number for each group of states
 NUMBERS = {
@@ -55,8 +55,8 @@ def empty_scores(runs: int, groups: int, kept: int) -> Scored:
     )
 
 
-def score_lanes(scores: Scores, n: int, kept: Array, seconds: float) -> Scored:
-    """Scores of runs in lanes, all of which succeeded, with definite covariances."""
+def score_ensemble(scores: Scores, n: int, kept: Array, seconds: float) -> Scored:
+    """Scores of an ensemble, all of which succeeded, with definite covariances."""
     M, K = scores.nees.shape
     half = slice(K // 2, None)
     squared = scores.squared  # sums run along memory: the same bits whatever runs beside them

@@ -11,12 +11,12 @@ def advance(t, dt, count, x, p, Q, scale):
     done = 0.0
     for i in range(int(p.manoeuvres[0])):
         at = manoeuvre(i)
-        if happens(p.manoeuvres[at], t, dt):
+        if manoeuvre_within(p.manoeuvres[at], t, dt):
             part = minimum(p.manoeuvres[at] - t, dt) - done
-            x, G, Q_part = coast_noise(t + done, part, share(count, part, dt), x, identity_rows(), p, Q, 0.0)
+            x, G, Q_part = propagate_arc_noise(t + done, part, substeps_for(count, part, dt), x, identity_rows(), p, Q, 0.0)
             x = x + load_vector(p.manoeuvres, at + 1, N)
             Phi = G @ Phi
             Q_step = G @ Q_step @ G.T + Q_part + load_matrix(p.manoeuvres, at + 1 + N, N, N)
             done += part
-    x, G, Q_part = coast_noise(t + done, dt - done, share(count, dt - done, dt), x, identity_rows(), p, Q, scale)
+    x, G, Q_part = propagate_arc_noise(t + done, dt - done, substeps_for(count, dt - done, dt), x, identity_rows(), p, Q, scale)
     return x, G @ Phi, symmetric(G @ Q_step @ G.T + Q_part)

@@ -64,7 +64,7 @@ def advance_border(k, d, defect, border):
 
 
 @inline
-def absorb_row(h, nu, at, of_constants, d, P, border):
+def update_bordered(h, nu, at, of_constants, d, P, border):
     """One measurement of unit noise: the chain's update for given unknowns; its innovation goes into the triangle.
 
     Its derivatives by the constants stand at `at`; one that only says something of the states has none.

@@ -20,7 +20,7 @@ def update_scalar(d, P, h, nu):
 
 
 @inline
-def absorb_epoch(first, last, d, P, chain):
+def update_deviation(first, last, d, P, chain):
     """Deviation and covariance after the measurements first ... last - 1, and the sum of their squared innovations."""
     fit = 0.0
     for c in range(first, last):
@@ -43,8 +43,8 @@ def damp(d, P, damping, chain, slot, keep):
 
 
 @inline
-def follow_epoch(first, last, d, P, P_old, C, chain):
-    """As `absorb_epoch`, and the same for the oldest state: its covariance, and C = Cov(this state, the oldest)."""
+def update_fixed_point(first, last, d, P, P_old, C, chain):
+    """As `update_deviation`, and the same for the oldest state: its covariance, and C = Cov(this state, the oldest)."""
     for c in range(first, last):
         if not isnan(chain.nu[c]):
             h = load_vector(chain.H, c * N, N)
@@ -78,7 +78,7 @@ def predict_deviation(j, k, d, P, run, chain):
 
 
 @inline
-def forward_following(a, W, run, chain, m, P):
+def forward_fixed_point(a, W, run, chain, m, P):
     """As `forward`, undamped; the covariance of the oldest state given all measurements of the stretch comes with it."""
     base = run.first_row[a]
     d = m - load_vector(chain.x, a * N, N)
@@ -93,7 +93,7 @@ def forward_following(a, W, run, chain, m, P):
         store(chain.d_pred, j * N, d)
         store(chain.P_pred, j * N * N, P)
         first = (run.first_row[k] - base) * M
-        d, P, P_old, C = follow_epoch(first, (run.first_row[k + 1] - base) * M, d, P, P_old, C, chain)
+        d, P, P_old, C = update_fixed_point(first, (run.first_row[k + 1] - base) * M, d, P, P_old, C, chain)
         if j == 0:  # its own measurements in Joseph form: a wide prior less what they say would leave no digits
             C = P
             P_old = P
@@ -113,7 +113,7 @@ def forward(a, W, run, chain, m, P, damping):
         P = symmetric(P)
         store(chain.d_pred, j * N, d)
         store(chain.P_pred, j * N * N, P)
-        d, P, squared = absorb_epoch((run.first_row[k] - base) * M, (run.first_row[k + 1] - base) * M, d, P, chain)
+        d, P, squared = update_deviation((run.first_row[k] - base) * M, (run.first_row[k + 1] - base) * M, d, P, chain)
         fit += squared
         if damping > 0.0:
             d, P = damp(d, P, damping, chain, 0, 0)

@@ -16,7 +16,7 @@ def record(row, P, measured, own, innovations):
 
 
 @inline
-def note_width(row, measured, innovations, widest):
+def record_variance_ratio(row, measured, innovations, widest):
     """Keep the largest predicted variance of a component that is there, in units of its noise."""
     for i in range(M):
         s = innovations.S[(row * M + i) * M + i]
@@ -33,5 +33,5 @@ def update_epoch(run, k, x, P, p, measured, innovations):
     for row in range(run.first_row[k], run.first_row[k + 1]):
         innovate_row(measured, row, run.t[k], x, p, own.nu, own.H, 0)
         record(row, P_pred, measured, own, innovations)
-        d, P = absorb(d, P, measured.station[row], measured, own)
+        d, P = update_row(d, P, measured.station[row], measured, own)
     return x + d, P

@@ -32,7 +32,7 @@ def squared_innovation(row, innovations, L):
 
 
 @inline
-def judge(run, k, x, P, p, measured, gate, innovations):
+def gate_rows(run, k, x, P, p, measured, gate, innovations):
     """Innovations of all rows at the prediction, and which rows lie beyond the gate of their number of components."""
     own = Row(scratch(M), scratch(MN), scratch(WORK))
     for row in range(run.first_row[k], run.first_row[k + 1]):
@@ -49,7 +49,7 @@ def update_epoch_guarded(run, k, x, P, p, measured, gate, innovations):
     Linearised at x + d, a row says nu + H d about the deviation from the prediction x (Bell and Cathey, IEEE Trans. Automatic
     Control 38, 1993); the covariance is that of the last step.
     """
-    judge(run, k, x, P, p, measured, gate, innovations)
+    gate_rows(run, k, x, P, p, measured, gate, innovations)
     own = Row(scratch(M), scratch(MN), scratch(WORK))
     d = unit(-1, N)
     P_new = P
@@ -62,5 +62,5 @@ def update_epoch_guarded(run, k, x, P, p, measured, gate, innovations):
                 innovate_row(measured, row, run.t[k], x + offset, p, own.nu, own.H, 0)
                 for i in range(M):
                     own.nu[i] = own.nu[i] + load_vector(own.H, i * N, N) @ offset
-                d, P_new = absorb(d, P_new, measured.station[row], measured, own)
+                d, P_new = update_row(d, P_new, measured.station[row], measured, own)
     return x + d, P_new

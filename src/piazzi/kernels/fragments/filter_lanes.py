@@ -1,6 +1,6 @@
 """The extended Kalman filter over `LANES` runs together, which share times, stations and what is missing (nothing)."""
 
-from piazzi.kernels.fragments.score_lanes import nees_lanes, note_error, squared_lanes
+from piazzi.kernels.fragments.score_lanes import nees_lanes, squared_lanes, store_errors
 from piazzi.kernels.fragments.step_lanes import ones, transition_lanes
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
@@ -21,7 +21,7 @@ def whiten_lanes(s, stations, nu, H):
 
 
 @inline
-def absorb_lanes(d, P, s, stations, nu, H):
+def update_lanes(d, P, s, stations, nu, H):
     """Correction `d` of the predicted states and covariances after one row of station s, by components, and its NIS.
 
     Joseph form for a scalar, as in `update_components`.
@@ -72,17 +72,17 @@ def filter_lanes(
                 innovate_lanes(stations.sensor[s], run.t[k], x, p, stations.numbers, s * NUMBERS, z, nu, H)
                 if stations.correlated[s]:
                     whiten_lanes(s, stations, nu, H)
-                d_row, P_row, nis = absorb_lanes(0.0 * x, P_pred, s, stations, nu, H)
+                d_row, P_row, nis = update_lanes(0.0 * x, P_pred, s, stations, nu, H)
                 if row == run.first_row[k]:
                     d = d_row
                     P = P_row
                 else:
-                    d, P, _ = absorb_lanes(d, P, s, stations, nu, H)
+                    d, P, _ = update_lanes(d, P, s, stations, nu, H)
                 store_lanes(accuracy.nis, r * J + row, J, vector(nis))
             if at_truth == 0:
                 x = x + d
             e = x - load_lanes(samples.truth, (r * K + k) * N, N, K * N, LANES)
-            note_error(e, P, own)
+            store_errors(e, P, own)
             squared_lanes(r * accuracy.groups * K + k, K, e, own, accuracy)
             nees, pivot = nees_lanes(one, own)
             least = minimum(least, pivot)

@@ -18,6 +18,6 @@ def live_update_guarded(
     x, P = update_epoch_guarded(run, 0, x, P, p, measured, gate, innovations)
     for row in range(run.first_row[1]):
         if gate.rejected[row] == 0:
-            note_width(row, measured, innovations, widest)
+            record_variance_ratio(row, measured, innovations, widest)
     store(now.mean, 0, x)
     store(now.covariance, 0, symmetric(P))

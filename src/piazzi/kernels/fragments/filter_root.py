@@ -1,7 +1,7 @@
 """A filter that carries a root of its covariance, over a whole run or one epoch."""
 
-from piazzi.kernels.fragments.root import begin_epoch, finish_epoch, record_root, take_row
-from piazzi.kernels.fragments.root_linear import advance_root, sense
+from piazzi.kernels.fragments.root import begin_epoch, finish_epoch, record_root, update_root_row
+from piazzi.kernels.fragments.root_linear import advance_root, innovate_root
 from piazzi.kernels.fragments.semidefinite import root_of
 from piazzi.kernels.fragments.triangle import covariance_of
 from piazzi.kernels.vocabulary import *  # noqa: F403
@@ -34,12 +34,12 @@ def run_root_filter(
         before = run.t[k]
         begin_epoch(joint)
         for row in range(run.first_row[k], run.first_row[k + 1]):
-            sense(measured, row, run.t[k], x, p, root, own, joint)
+            innovate_root(measured, row, run.t[k], x, p, root, own, joint)
             record_root(row, measured, own, joint, innovations)
             squared, present = squared_innovation(row, innovations, own.work)
             gate.rejected[row] = 1 if squared > gate.limits[present] else 0
             if gate.rejected[row] == 0:
-                take_row(row, measured, own, joint)
+                update_root_row(row, measured, own, joint)
         x = finish_epoch(x, root, joint)
         store(beliefs.mean, k * N, x)
         store(beliefs.covariance, k * N * N, covariance_of(root.U))

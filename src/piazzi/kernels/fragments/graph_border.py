@@ -24,10 +24,10 @@ def border_solve(run: Run, start: Array, defect: Array, chain: Chain, border: Bo
                 widest = inf if isnan(width) else maximum(widest, width)
         for c in rows:
             if not isnan(chain.nu[c]):
-                d, P = absorb_row(load_vector(chain.H, c * N, N), chain.nu[c], c * C, 1, d, P, border)
+                d, P = update_bordered(load_vector(chain.H, c * N, N), chain.nu[c], c * C, 1, d, P, border)
         if damping > 0.0:
             for i in range(N):
-                d, P = absorb_row(sqrt(damping) * load_vector(chain.scaling, i * N, N), 0.0, 0, 0, d, P, border)
+                d, P = update_bordered(sqrt(damping) * load_vector(chain.scaling, i * N, N), 0.0, 0, 0, d, P, border)
     if damping > 0.0:
         for i in range(C):
             for j in range(size):

@@ -38,7 +38,7 @@ def information_before(first, last, chain, Y):
 
 
 @inline
-def forget(Y, T, noise, amount, keep_cross):
+def marginalize_noise(Y, T, noise, amount, keep_cross):
     """Information about a state as information about the one it had been without its process noise; T collects the steps.
 
     One direction g of the noise at a time: (I - k g^T) Y (I - g k^T) + k k^T with k = Y g / (1 + g^T Y g).
@@ -56,7 +56,7 @@ def forget(Y, T, noise, amount, keep_cross):
 
 
 @inline
-def informed(P, h):
+def updated_covariance(P, h):
     """Covariances after one measurement of unit noise, in Joseph form."""
     Ph = h @ P
     K = (1.0 / (h @ Ph + 1.0)) * Ph
@@ -65,7 +65,7 @@ def informed(P, h):
 
 
 @inline
-def inform(at, stride, own, covariance, rows, lost):
+def add_information(at, stride, own, covariance, rows, lost):
     """Covariances of `LANES` states, at `at`, `at + stride`, ..., in the place of their information, in Joseph form.
 
     Each covariance given all measurements so far, in `own`, takes the information of later ones in as measurements of unit
@@ -80,7 +80,7 @@ def inform(at, stride, own, covariance, rows, lost):
     for j in range(N):
         h, lacks = next_direction(rows, j)
         missing = missing + lacks
-        P = informed(P, h)
+        P = updated_covariance(P, h)
     store_packs(lost, 0, vector(missing), LANES)
     lanes = LANES if stride > 0 else 1
     for lane in range(lanes):
@@ -89,17 +89,17 @@ def inform(at, stride, own, covariance, rows, lost):
     store_lanes(covariance, at, stride, symmetric(P))
     for lane in range(lanes):
         if lost[lane] > 0.0:
-            inform_alone(rows, lane * NN, own, lane * stride, covariance, at + lane * stride)
+            add_information_pivoted(rows, lane * NN, own, lane * stride, covariance, at + lane * stride)
 
 
 @inline
-def inform_alone(information, from_here, own, own_at, covariance, at):
-    """As `inform`, of one state, by factors with pivots."""
+def add_information_pivoted(information, from_here, own, own_at, covariance, at):
+    """As `add_information`, of one state, by factors with pivots."""
     rows = scratch(NN)
     root_of(load_matrix(information, from_here, N, N), rows, 0)
     P = load_matrix(own, own_at, N, N)
     for j in range(N):
-        P = informed(P, load_vector(rows, j * N, N))
+        P = updated_covariance(P, load_vector(rows, j * N, N))
     store(covariance, at, symmetric(P))
 
 
@@ -123,7 +123,7 @@ def marginal_covariances(a, W, run, chain, P_last, keep_cross, covariance, cross
         if noise_varies():
             root_of(noise_at(j + 1, amount, Q, chain.Q_all), g, 0)
             amount = 1.0
-        Y, T = forget(Y, identity(N), g, amount, keep_cross)
+        Y, T = marginalize_noise(Y, identity(N), g, amount, keep_cross)
         F = load_matrix(chain.Phi, j * N * N, N, N)
         Y = symmetric(F.T @ Y @ F)
         store(covariance, k * N * N, Y)
@@ -135,9 +135,9 @@ def marginal_covariances(a, W, run, chain, P_last, keep_cross, covariance, cross
         for lane in range(together):
             first, last = first_row[a + j + lane], first_row[a + j + lane + 1]
             P = load_matrix(chain.P_pred, (j + lane) * N * N, N, N)
-            _, P, _ = absorb_epoch((first - base) * M, (last - base) * M, unit(-1, N), P, chain)
+            _, P, _ = update_deviation((first - base) * M, (last - base) * M, unit(-1, N), P, chain)
             store(own, lane * N * N, P)
-        inform((a + j) * N * N, N * N if together > 1 else 0, own, covariance, rows, lost)
+        add_information((a + j) * N * N, N * N if together > 1 else 0, own, covariance, rows, lost)
         j += together
     store(covariance, (a + W - 1) * N * N, symmetric(P_last))
     if keep_cross:

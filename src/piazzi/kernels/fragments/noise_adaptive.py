@@ -4,8 +4,8 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def coast_noise(t, dt, count, x, R, p, Q, scale):
-    """Next state, its derivative times the rows `R`, and the noise of the interval, by the steps of `coast_jacobian`."""
+def propagate_arc_noise(t, dt, count, x, R, p, Q, scale):
+    """Next state, its derivative times the rows `R`, and the noise of the interval, by the steps of the derivative."""
     Q_step = 0.0 * Q
     widest = dt / count
     h = widest
@@ -15,7 +15,7 @@ def coast_noise(t, dt, count, x, R, p, Q, scale):
         h = dt - at if last else h
         y, R_next, error = trial_jacobian(t + at, h, x, R, p)
         if error <= 1.0:
-            Q_step, _ = carry_noise(Q_step, t + at, h, x, Q, p)
+            Q_step, _ = propagate_noise(Q_step, t + at, h, x, Q, p)
             x, R = y, R_next
             at += h
             if last:

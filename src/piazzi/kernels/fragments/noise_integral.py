@@ -15,7 +15,7 @@ def add_noise(Q_step, h, x, middle, y, G, E, Q):
 
 
 @inline
-def coast_noise(t, dt, count, x, R, p, Q, scale):
+def propagate_arc_noise(t, dt, count, x, R, p, Q, scale):
     """Next state, its derivative times the rows `R`, and the process noise of the interval."""
     h = dt / count
     Phi = complete(R)

@@ -4,7 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def coast_noise(t, dt, count, x, R, p, Q, scale):
+def propagate_arc_noise(t, dt, count, x, R, p, Q, scale):
     """Next state, its derivative times the rows `R`, and the process noise of the interval; NaN beyond `MAX_PANELS`."""
     y, R = substep_jacobian(t, dt, x, R, p)
     Q_step = 0.0 * Q
@@ -14,7 +14,7 @@ def coast_noise(t, dt, count, x, R, p, Q, scale):
         h = minimum(panel(x, p), widest)
         last = h >= 0.999 * (dt - at)
         h = dt - at if last else h
-        Q_step, x = carry_noise(Q_step, t + at, h, x, Q, p)
+        Q_step, x = propagate_noise(Q_step, t + at, h, x, Q, p)
         at += h
         if last:
             return y, complete(R), symmetric(Q_step)

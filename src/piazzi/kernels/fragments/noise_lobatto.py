@@ -4,7 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def carry_noise(Q_step, t, h, x, Q, p):
+def propagate_noise(Q_step, t, h, x, Q, p):
     """Process noise at the end of a stretch of `h` seconds from the one at its beginning, and the state there.
 
     Congruences from node to node, so that the result is semidefinite whatever the step: with G over a gap between two nodes,

@@ -63,7 +63,7 @@ def whiten_root(row, measured, own, joint):
 
 
 @inline
-def absorb_root(c, nu, joint):
+def update_root(c, nu, joint):
     """Correction and joint root after component c, of unit noise: B' = B - B phi phi^T / (S + sqrt(S)).
 
     Where the component is far more exact than what was known, the difference loses its digits: then one column of B after the
@@ -101,12 +101,12 @@ def absorb_root(c, nu, joint):
 
 
 @inline
-def take_row(row, measured, own, joint):
+def update_root_row(row, measured, own, joint):
     """One row of measurements, as it was sensed, into the epoch's correction."""
     whiten_root(row, measured, own, joint)
     for c in range(M):
         if not isnan(own.nu[c]):
-            absorb_root(c, own.nu, joint)
+            update_root(c, own.nu, joint)
 
 
 @inline

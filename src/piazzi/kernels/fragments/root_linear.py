@@ -24,7 +24,7 @@ def advance_root(run, k, before, x, p, Q, root):
 
 
 @inline
-def sense(measured, row, t, x, p, root, own, joint):
+def innovate_root(measured, row, t, x, p, root, own, joint):
     """Innovation of a row, and how it depends on the unknowns, H r_i, into the rows of `joint.G`."""
     innovate_row(measured, row, t, x, p, own.nu, own.H, 0)
     for c in range(M):

@@ -22,7 +22,7 @@ def unknowns():
 
 
 @inline
-def carry_points(run, k, before, x, p, root):
+def propagate_points(run, k, before, x, p, root):
     """The sigma points around `x` at epoch k, `LANES` at a time: x + eta r_i, then x - eta r_i."""
     points = root.points
     for i in range(N):
@@ -35,7 +35,7 @@ def carry_points(run, k, before, x, p, root):
     dt, count = run.t[k] - before, run.count[k]
     for g in range(groups):
         at = g * LANES * N
-        store_lanes(points, at, N, travel(before, dt, count, load_lanes(points, at, N, N, LANES), p))
+        store_lanes(points, at, N, propagate(before, dt, count, load_lanes(points, at, N, N, LANES), p))
 
 
 @inline
@@ -43,7 +43,7 @@ def advance_root(run, k, before, x, p, Q, root):
     """The mean at epoch k; its root, in place, with the process noise along the central point."""
     eta, points, rows = root.eta, root.points, root.rows
     centre, _, Q_step = advance(before, run.t[k] - before, run.count[k], x, p, Q, run.scale[k])
-    carry_points(run, k, before, x, p, root)
+    propagate_points(run, k, before, x, p, root)
     total = unit(-1, N)
     for i in range(N):
         plus = load_vector(points, i * N, N) - centre
@@ -67,7 +67,7 @@ def innovate_from(z, s, t, x, p, measured, own):
 
 
 @inline
-def sense(measured, row, t, x, p, root, own, joint):
+def innovate_root(measured, row, t, x, p, root, own, joint):
     """Innovation of a row, and how it depends on the unknowns, o_i and s_i + c sum of s_j, into the rows of `joint.G`."""
     eta, nu, G, s = root.eta, own.nu, joint.G, measured.station[row]
     measure_row(measured, row, t, x, p, joint.centre, 0)

@@ -4,7 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def note_error(e, P, own):
+def store_errors(e, P, own):
     """Errors, covariances and variances into work space, entry by entry."""
     store_packs(own.e, 0, e, LANES)
     store_packs(own.P, 0, P, LANES)

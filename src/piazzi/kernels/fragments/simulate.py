@@ -29,7 +29,7 @@ def run_simulation(run: Run, p: Given, measured: Measured, first: Array, w: Arra
     for k in range(run.epochs):
         if run.t[k] > before:
             start = x
-            x = travel(before, run.t[k] - before, run.count[k], start, p)
+            x = propagate(before, run.t[k] - before, run.count[k], start, p)
             _, _, Q_step = advance(before, run.t[k] - before, run.count[k], start, p, Q, run.scale[k])
             store(L, 0, Q_step)
             factor_in_place(L)

@@ -1,6 +1,6 @@
 """Draw truths and their measurements, `LANES` runs together: what `simulate` does, with process noise of one shape."""
 
-from piazzi.kernels.fragments.step_lanes import ones, travel_lanes
+from piazzi.kernels.fragments.step_lanes import ones, propagate_lanes
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
@@ -15,7 +15,7 @@ def simulate_lanes(run: Run, p: Given, stations: Stations, drawn: Drawn, samples
         before = run.t_prior
         for k in range(K):
             if run.t[k] > before:
-                moved = travel_lanes(before, run.t[k] - before, run.count[k], x, p)
+                moved = propagate_lanes(before, run.t[k] - before, run.count[k], x, p)
                 x = moved + sqrt(run.scale[k]) * (L @ load_lanes(drawn.w, (r * K + k) * N, N, K * N, LANES))
             before = run.t[k]
             store_lanes(samples.truth, (r * K + k) * N, K * N, x)

@@ -14,7 +14,7 @@ def run_step_error(run: Run, finer: Indices, p: Given, measured: Measured, prior
     for k in range(run.epochs):
         if run.t[k] > before:
             dt = run.t[k] - before
-            exact = travel(before, dt, finer[k], x, p)
+            exact = propagate(before, dt, finer[k], x, p)
             x, Phi, Q_step = advance(before, dt, run.count[k], x, p, Q, run.scale[k])
             bias = Phi @ bias + (x - exact)
             P = Phi @ P @ Phi.T + Q_step
@@ -26,9 +26,9 @@ def run_step_error(run: Run, finer: Indices, p: Given, measured: Measured, prior
             innovate_row(measured, row, run.t[k], x, p, own.nu, own.H, 0)
             for i in range(M):
                 own.nu[i] = nan if isnan(own.nu[i]) else 0.0
-            bias, _ = absorb(bias, P_new, s, measured, own)
+            bias, _ = update_row(bias, P_new, s, measured, own)
             innovate_row(measured, row, run.t[k], x, p, own.nu, own.H, 0)
-            d, P_new = absorb(d, P_new, s, measured, own)
+            d, P_new = update_row(d, P_new, s, measured, own)
         x = x + d
         P = symmetric(P_new)
         store(beliefs.mean, k * N, bias)

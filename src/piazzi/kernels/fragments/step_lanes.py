@@ -12,7 +12,7 @@ def ones():
 
 
 @inline
-def travel_lanes(t, dt, count, x, p):
+def propagate_lanes(t, dt, count, x, p):
     """The states `dt` seconds later."""
     h = dt / count
     y = substep(t, h, remember(x), p)

@@ -16,30 +16,30 @@ def manoeuvre(i):
 
 
 @inline
-def happens(when, t, dt):
+def manoeuvre_within(when, t, dt):
     """Whether `when` is in (t, t + dt], whichever way the sum was rounded."""
     slack = 1e-12 * maximum(fabs(when), 1.0)
     return when - t > slack and when - (t + dt) <= slack
 
 
 @inline
-def share(count, part, dt):
+def substeps_for(count, part, dt):
     """Substeps for a part of an interval, at least one."""
     return count if part == dt else 1 + int(count * (part / dt) * (1.0 - 1e-9))
 
 
 @inline
-def travel(t, dt, count, x, p):
+def propagate(t, dt, count, x, p):
     """The state `dt` seconds later."""
     x = remember(x)
     done = 0.0
     for i in range(int(p.manoeuvres[0])):
         at = manoeuvre(i)
-        if happens(p.manoeuvres[at], t, dt):
+        if manoeuvre_within(p.manoeuvres[at], t, dt):
             part = minimum(p.manoeuvres[at] - t, dt) - done
-            x = coast(t + done, part, share(count, part, dt), x, p) + load_vector(p.manoeuvres, at + 1, N)
+            x = propagate_arc(t + done, part, substeps_for(count, part, dt), x, p) + load_vector(p.manoeuvres, at + 1, N)
             done += part
-    return coast(t + done, dt - done, share(count, dt - done, dt), x, p)
+    return propagate_arc(t + done, dt - done, substeps_for(count, dt - done, dt), x, p)
 
 
 @inline
@@ -49,10 +49,10 @@ def transition(t, dt, count, x, p):
     done = 0.0
     for i in range(int(p.manoeuvres[0])):
         at = manoeuvre(i)
-        if happens(p.manoeuvres[at], t, dt):
+        if manoeuvre_within(p.manoeuvres[at], t, dt):
             part = minimum(p.manoeuvres[at] - t, dt) - done
-            x, R = coast_jacobian(t + done, part, share(count, part, dt), x, R, p)
+            x, R = propagate_arc_jacobian(t + done, part, substeps_for(count, part, dt), x, R, p)
             x = x + load_vector(p.manoeuvres, at + 1, N)
             done += part
-    x, R = coast_jacobian(t + done, dt - done, share(count, dt - done, dt), x, R, p)
+    x, R = propagate_arc_jacobian(t + done, dt - done, substeps_for(count, dt - done, dt), x, R, p)
     return x, complete(R)

@@ -10,6 +10,6 @@ def update_once(t: float, p: Given, measured: Measured, belief: Belief, innovati
     P = load_matrix(belief.covariance, 0, N, N)
     innovate_row(measured, 0, t, x, p, own.nu, own.H, 0)
     record(0, P, measured, own, innovations)
-    d, P_new = absorb(unit(-1, N), P, measured.station[0], measured, own)
+    d, P_new = update_row(unit(-1, N), P, measured.station[0], measured, own)
     store(belief.mean, 0, x + d)
     store(belief.covariance, 0, symmetric(P_new))

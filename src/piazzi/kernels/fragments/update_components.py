@@ -4,7 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def absorb(d, P, s, measured, own):
+def update_row(d, P, s, measured, own):
     """Correction `d` of the predicted state and covariance after one row of station s, linearised where `own` was.
 
     Joseph form for a scalar: with B = P (I - K H)^T, P' = (I - K H) B + K r K^T = B + K (r K - H B)^T.

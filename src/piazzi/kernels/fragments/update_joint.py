@@ -12,7 +12,7 @@ def noise(nu, R, at, i, j):
 
 
 @inline
-def absorb(d, P, s, measured, own):
+def update_row(d, P, s, measured, own):
     """Correction `d` of the predicted state and covariance after one row of station s, linearised where `own` was.
 
     Gain by a Cholesky solve, S = L L^T; `work` holds L, then the rows of K^T.  Joseph form, row by row:

@@ -24,7 +24,7 @@ def run_window(
     a = 0
     for k in range(run.epochs):
         if k > 0:
-            store(x, k * N, travel(t[k - 1], t[k] - t[k - 1], run.count[k], load_vector(x, (k - 1) * N, N), p))
+            store(x, k * N, propagate(t[k - 1], t[k] - t[k - 1], run.count[k], load_vector(x, (k - 1) * N, N), p))
             base = a
             while a < begin[k]:
                 marginalize_oldest(a, base, window, run, p, chain)

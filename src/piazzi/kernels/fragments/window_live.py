@@ -10,7 +10,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 def live_append(span: Indices, run: Run, p: Given, chain: Chain) -> None:
     k = span[1]
     x = load_vector(chain.x, (k - 1) * N, N)
-    store(chain.x, k * N, travel(run.t[k - 1], run.t[k] - run.t[k - 1], run.count[k], x, p))
+    store(chain.x, k * N, propagate(run.t[k - 1], run.t[k] - run.t[k - 1], run.count[k], x, p))
 
 
 @entry
@@ -33,5 +33,5 @@ def live_solve(
     k = span[1]
     P = solve_window(span[0], k, window, run, p, measured, chain, innovations)
     for row in range(run.first_row[k], run.first_row[k + 1]):
-        note_width(row, measured, innovations, widest)
+        record_variance_ratio(row, measured, innovations, widest)
     store(window.newest, 0, P)

@@ -10,7 +10,7 @@ def marginalize_oldest(a, base, window, run, p, chain):
     x = load_vector(chain.x, a * N, N)
     last_step = load_vector(chain.dx, (a - base) * N, N)
     first = (run.first_row[a] - run.first_row[base]) * M
-    d, P, _ = absorb_epoch(first, (run.first_row[a + 1] - run.first_row[base]) * M, m - (x - last_step), P, chain)
+    d, P, _ = update_deviation(first, (run.first_row[a + 1] - run.first_row[base]) * M, m - (x - last_step), P, chain)
     dt = run.t[a + 1] - run.t[a]
     y, F, Q_step = advance(run.t[a], dt, run.count[a + 1], x, p, Q_matrix(run.Q), run.scale[a + 1])
     store(window.m, 0, y + F @ (d - last_step))

@@ -16,7 +16,7 @@ def solve_window(a, k, window, run, p, measured, chain, innovations):
     for iteration in range(window.iterations):
         linearize_dynamics(a, W, run, chain, p)
         linearize_rows(a, W, run, chain, p, measured)
-        _, P_new, P_old = forward_following(a, W, run, chain, m, P)
+        _, P_new, P_old = forward_fixed_point(a, W, run, chain, m, P)
         if iteration == 0:
             x, d = load_vector(chain.x, k * N, N), load_vector(chain.d_pred, (W - 1) * N, N)
             record_epoch(k, run, p, measured, x, d, load_matrix(chain.P_pred, (W - 1) * N * N, N, N), innovations)

@@ -4,7 +4,7 @@ When an epoch arrives its states are only predicted, so its rows are weighted by
 Where Tukey's loss rejects most of the window, Cauchy's with the same constant leads back.
 """
 
-from piazzi.kernels.fragments.chain import follow_epoch, predict_deviation
+from piazzi.kernels.fragments.chain import predict_deviation, update_fixed_point
 from piazzi.kernels.fragments.linearize_robust import weigh_row, whiten_row
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
@@ -59,8 +59,8 @@ def solve_window(a, k, window, run, p, measured, chain, innovations):
                 record_epoch(k, run, p, measured, newest, d, P_new, innovations)
                 weigh_new_rows(k, base, run, newest, p, measured, chain, innovations)
             first = (run.first_row[a + j] - base) * M
-            d, P_new, P_old, C = follow_epoch(first, (run.first_row[a + j + 1] - base) * M, d, P_new, P_old, C, chain)
-            if j == 0:  # as in `forward_following`
+            d, P_new, P_old, C = update_fixed_point(first, (run.first_row[a + j + 1] - base) * M, d, P_new, P_old, C, chain)
+            if j == 0:  # as in `forward_fixed_point`
                 C = P_new
                 P_old = P_new
         chain.loss[0] = kind

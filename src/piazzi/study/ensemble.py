@@ -1,13 +1,10 @@
-"""Many runs of one problem together in vector lanes: simulation, the extended Kalman filter, and what its errors are."""
+"""Many runs of one problem together, an ensemble: simulation, the extended Kalman filter, and what its errors are."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
@@ -16,8 +13,6 @@ from piazzi.kernels.bundle import Accuracy, Drawn, Ends, Given, Run, Samples, St
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
-
-LOGGER = logging.getLogger("piazzi.study")
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,13 +140,13 @@ def simulate_runs(layout: Layout, actual: Problem, first: Array, w: Array, v: Ar
     w, v : (M, K, n) and (M, J, m), standard normal
     noisy : whether the sensors have errors
     """
-    lanes, M = lane_count(), len(w)
-    first, w, v = _padded(lanes, first, w, v)
+    M = len(w)
+    first, w, v = _padded(first, w, v)
     R_root = layout.root if noisy else np.zeros_like(layout.root)
     drawn = Drawn(first=first, w=w, v=v, Q_root=semidefinite_root(actual.process_noise.covariance), R_root=R_root)
     samples = Samples(many=len(w), rows=v.shape[1], truth=np.empty(w.shape), z=np.full(v.shape, np.nan))
     run, p, stations = layout.bundles(actual)
-    _library(actual, lanes).simulate_lanes(run, p, stations, drawn, samples)
+    library(actual).simulate_lanes(run, p, stations, drawn, samples)
     return samples.truth[:M], samples.z[:M]
 
 
@@ -166,8 +161,8 @@ def filter_runs(layout: Layout, z: Array, truth: Array, *, at_truth: bool = Fals
     With `at_truth`, everything is linearised at the truth and the mean stays there: the covariances are then the Cramer-Rao
     bound of each run.
     """
-    problem, lanes, M = layout.problem, lane_count(), len(z)
-    z, truth = _padded(lanes, z, truth)
+    problem, M = layout.problem, len(z)
+    z, truth = _padded(z, truth)
     (runs, J, _), (_, K, n), member = z.shape, truth.shape, layout.member
     G = len(member)
     samples, ends = Samples(many=runs, rows=J, truth=truth, z=z), Ends.empty(runs=runs, N=n)
@@ -175,7 +170,7 @@ def filter_runs(layout: Layout, z: Array, truth: Array, *, at_truth: bool = Fals
     nees, nis, lowest = np.empty((runs, K)), np.empty((runs, J)), np.empty(runs)
     accuracy = Accuracy(groups=G, member=member, squared=squared, spread=spread, nees=nees, nis=nis, lowest=lowest)
     run, p, stations = layout.bundles(problem)
-    _library(problem, lanes).filter_lanes(run, p, stations, problem.prior_bundle, samples, int(at_truth), ends, accuracy)
+    library(problem).filter_lanes(run, p, stations, problem.prior_bundle, samples, int(at_truth), ends, accuracy)
     return ends.mean[:M], ends.covariance[:M], Scores(squared[:M], spread[:M], nees[:M], nis[:M], lowest[:M])
 
 
@@ -190,32 +185,15 @@ def semidefinite_root(Q: Array) -> Array:
     return L
 
 
-def _library(problem: Problem, lanes: int) -> SimpleNamespace:
+def library(problem: Problem) -> SimpleNamespace:
+    """The kernels of an ensemble, built where they are new."""
     fragments = ("transition", "step_lanes", "score_lanes", "simulate_lanes", "filter_lanes")
-    return kernels.load(problem.spec(*fragments, lanes=lanes))
+    return kernels.load(problem.spec(*fragments, lanes=lane_count()))
 
 
-def _padded(lanes: int, *arrays: Array) -> tuple[Array, ...]:
+def _padded(*arrays: Array) -> tuple[Array, ...]:
     """Arrays of runs, the last run repeated where there are fewer than lanes."""
-    missing = lanes - len(arrays[0])
+    missing = lane_count() - len(arrays[0])
     if missing > 0:
         arrays = tuple(np.concatenate([a, np.repeat(a[-1:], missing, axis=0)]) for a in arrays)
     return tuple(np.ascontiguousarray(a) for a in arrays)
-
-
-_refused: dict[tuple[Any, ...], bool] = {}
-
-
-def compiles(function: Callable[..., Any], layout: Layout, *args: Any) -> bool:
-    """Whether the kernel in lanes can be made for this problem; a model of constants, say, has no lanes to speak of."""
-    problem = layout.problem
-    assert problem.integrator is not None
-    key = (function.__name__, problem.model, problem.integrator.scheme)
-    if key not in _refused:
-        try:
-            function(layout, *args)
-            _refused[key] = False
-        except Exception:  # Numba's own kinds of errors, which are not imported here
-            LOGGER.debug("no lanes for %s", problem.name, exc_info=True)
-            _refused[key] = True
-    return not _refused[key]

@@ -1,4 +1,4 @@
-"""Runs in lanes are the runs that the ordinary simulation, filter and metrics make one by one."""
+"""An ensemble has the runs that the ordinary simulation, filter and metrics make one by one."""
 
 from functools import cache
 
@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
 from piazzi.evaluate.metrics import errors, nees, nis, rmse
-from piazzi.study.lanes import Layout, filter_runs, semidefinite_root, simulate_runs
+from piazzi.study.ensemble import Layout, filter_runs, semidefinite_root, simulate_runs
 from tests.laws.problems import b612, network, random_covariance, satellite
 
 RUNS, EPOCHS = 11, 40
@@ -16,7 +16,7 @@ RUNS, EPOCHS = 11, 40
 
 @cache
 def case(name):
-    """A problem whose runs fit in lanes, and the seconds between its epochs."""
+    """A problem whose runs make an ensemble, and the seconds between its epochs."""
     scaled = pz.ProcessNoise([0.0, 0.0, 1e-5, 1e-5], "second", "scaled")
     return {
         "satellite": lambda: (satellite(), 15.0),
@@ -48,7 +48,7 @@ def one_by_one(layout, truth, z):
 
 
 @pytest.mark.parametrize("name", ["satellite", "b612", pytest.param("network", marks=pytest.mark.slow)])
-def test_filter_in_lanes_is_the_filter(name):
+def test_the_filter_of_an_ensemble_is_the_filter(name):
     layout, truth, z, (mean, P, scores) = runs_of(name)
     groups = layout.problem.model.group_indices
     for run in range(RUNS):
@@ -67,7 +67,7 @@ def test_filter_in_lanes_is_the_filter(name):
 
 
 @pytest.mark.parametrize("name", ["satellite", "b612", pytest.param("network", marks=pytest.mark.slow)])
-def test_truth_in_lanes_obeys_dynamics_noise_and_sensors(name):
+def test_truth_of_an_ensemble_obeys_dynamics_noise_and_sensors(name):
     """Each interval leaves L w, with L L^T = Q dt; what is measured is h, and L v with L L^T = R."""
     layout, truth, z, _ = runs_of(name)
     problem, times = layout.problem, layout.times
@@ -147,9 +147,9 @@ def test_root_of_a_semidefinite_matrix(rank):
     assert_array_equal(L, np.tril(L))
 
 
-def test_which_problems_fit_in_lanes():
-    assert satellite().runs_in_lanes
-    assert b612().runs_in_lanes
-    assert not satellite(method="integral").runs_in_lanes
-    assert not satellite(pz.Kepler(), method="scaled").runs_in_lanes
-    assert not satellite(manoeuvres=[pz.Manoeuvre(30.0, [1.0, 0.0])]).runs_in_lanes
+def test_which_problems_make_ensembles():
+    assert satellite().runs_in_ensemble
+    assert b612().runs_in_ensemble
+    assert not satellite(method="integral").runs_in_ensemble
+    assert not satellite(pz.Kepler(), method="scaled").runs_in_ensemble
+    assert not satellite(manoeuvres=[pz.Manoeuvre(30.0, [1.0, 0.0])]).runs_in_ensemble

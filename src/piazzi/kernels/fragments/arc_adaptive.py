@@ -65,7 +65,7 @@ def matrix_error(h, R, S, fifth, third):
 
 
 @inline
-def coast(t, dt, count, x, p):
+def propagate_arc(t, dt, count, x, p):
     """The state `dt` seconds later; NaN where `MAX_STEPS` do not get there or steps vanish."""
     widest = dt / count
     h = widest
@@ -86,7 +86,7 @@ def coast(t, dt, count, x, p):
 
 
 @inline
-def coast_jacobian(t, dt, count, x, R, p):
+def propagate_arc_jacobian(t, dt, count, x, R, p):
     """The state `dt` seconds later and its derivative times the rows `R`, in steps that keep to the tolerance in both."""
     widest = dt / count
     h = widest

@@ -4,7 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def coast(t, dt, count, x, p):
+def propagate_arc(t, dt, count, x, p):
     """The state `dt` seconds later, in `count` substeps."""
     h = dt / count
     y = scattered(x)  # the next substep waits for this one's position, entry by entry
@@ -14,7 +14,7 @@ def coast(t, dt, count, x, p):
 
 
 @inline
-def coast_jacobian(t, dt, count, x, R, p):
+def propagate_arc_jacobian(t, dt, count, x, R, p):
     """The state `dt` seconds later, and its derivative times the rows `R`."""
     h = dt / count
     y = scattered(x)

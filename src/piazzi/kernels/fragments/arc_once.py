@@ -4,12 +4,12 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def coast(t, dt, count, x, p):
+def propagate_arc(t, dt, count, x, p):
     """The state `dt` seconds later."""
     return substep(t, dt, x, p)
 
 
 @inline
-def coast_jacobian(t, dt, count, x, R, p):
+def propagate_arc_jacobian(t, dt, count, x, R, p):
     """The state `dt` seconds later, and its derivative times the rows `R`."""
     return substep_jacobian(t, dt, x, R, p)
