@@ -1,5 +1,6 @@
-"""The Earth: time scales, its orientation, frames and places on it."""
+"""The Earth: time scales, its orientation, frames, stations, Sun, Moon and planets."""
 
+from piazzi.earth.bodies import BODIES, body
 from piazzi.earth.eop import EOP, EOPTable, EOPWarning, read_eop
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import GravityField, gravity_field, read_gravity
@@ -16,10 +17,11 @@ from piazzi.earth.stations import (
     azimuth_elevation_range,
     up_north_east,
 )
+from piazzi.earth.tides import pole_tide, solid_tide, station_displacement
 
 __all__ = [
-    "EOP", "FRAMES", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch", "GravityField", "Station", "StationList",
-    "StationWarning", "azimuth_elevation_range", "geodetic_to_position", "gravity_field", "ilrs_stations",
-    "position_to_geodetic", "read_eop", "read_gravity", "read_stations", "rotation", "rotation_rate", "transform",
-    "up_north_east",
+    "BODIES", "EOP", "FRAMES", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch", "GravityField", "Station",
+    "StationList", "StationWarning", "azimuth_elevation_range", "body", "geodetic_to_position", "gravity_field",
+    "ilrs_stations", "pole_tide", "position_to_geodetic", "read_eop", "read_gravity", "read_stations", "rotation",
+    "rotation_rate", "solid_tide", "station_displacement", "transform", "up_north_east",
 ]  # fmt: skip
