@@ -27,6 +27,9 @@ class Format(NamedTuple):
     ephemeris: str | None = None
 
 
+_REMARKS = rb"(?:00[^\n]*\n)*"  # of the laser formats
+
+
 def _begins(pattern: bytes) -> Callable[[bytes], bool]:
     """Whether the first line with anything in it, past comments, is like that."""
     compiled = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|COMMENT[^\n]*\n)*" + pattern)
@@ -39,7 +42,11 @@ def _root(element: bytes) -> Callable[[bytes], bool]:
     return lambda head: compiled.match(head) is not None
 
 
-FORMATS: Mapping[str, Format] = {}  # name: how it is told, who reads it
+FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
+    "SP3": Format(_begins(rb"#[a-d][PV ]"), ephemeris="sp3:read"),
+    "CPF": Format(_begins(_REMARKS + rb"[Hh]1\s+[Cc][Pp][Ff]\s"), ephemeris="cpf:read"),
+    "CRD": Format(_begins(_REMARKS + rb"[Hh]1\s"), tracking="crd:read"),
+}
 
 
 def recognise(data: bytes) -> str | None:
