@@ -238,7 +238,8 @@ import piazzi as pz
 pz.read_tracking(sys.argv[1])
 before, started = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
 table = pz.read_tracking(sys.argv[2])
-print(len(table), time.process_time() - started, 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / len(table))
+spent, grown = time.process_time() - started, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+print(len(table), spent, 1024 * grown / len(table))
 """
 
 
