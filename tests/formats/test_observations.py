@@ -101,11 +101,31 @@ def test_what_the_user_says_fills_in_what_the_file_does_not():
     assert with_conventions(rows, Conventions.of(sigma="3 m")).open == rows.open  # the azimuth still has none
 
 
+def test_what_a_file_says_is_not_overridden():
+    said = Segment("UTC", tag="transmit", way="three-way", range_is="sum", frame="GCRF", interval=1.0,
+                   corrections=(Correction("range", 1.0, False), Correction("mag")))  # fmt: skip
+    rows = table(
+        segments=(said, Segment("UTC")), segment=[0, 0, 1], tag=[1, 1, 3], open=("when: --tag bounce", "over: --interval 1")
+    )
+    told = with_conventions(
+        rows, Conventions.of(tag="bounce", range="two-way", frame="ITRF", interval=60, corrections="applied")
+    )
+    assert (told.segments[0].tag, told.segments[0].way, told.segments[0].frame, told.segments[0].interval) == (
+        "transmit", "three-way", "GCRF", 1.0,
+    )  # fmt: skip
+    assert told.segments[0].corrections == (Correction("range", 1.0, False), Correction("mag", None, True))
+    assert (told.segments[1].tag, told.segments[1].frame, told.segments[1].interval) == ("bounce", "ITRF", 60.0)
+    assert_array_equal(told.tag, [1, 1, 2])
+    assert told.open == ()
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
         ({"range": "twoway"}, "did you mean 'two-way'"),
         ({"angles": "apparant"}, "did you mean 'apparent'"),
+        ({"tag": "recieve"}, "did you mean 'receive'"),
+        ({"interval": -1}, "positive"),
         ({"time": "BER=GPST"}, "'GPST' is no time scale"),
         ({"sigma": "rang=1m"}, "rang"),
         ({"sigma": "range=1s"}, "range has the unit s"),

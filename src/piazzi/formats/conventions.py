@@ -10,13 +10,17 @@ from typing import Any
 import numpy as np
 
 from piazzi.earth.scales import SCALES
-from piazzi.formats.kinds import ANGLES, KINDS
+from piazzi.formats.kinds import ANGLES, KINDS, TAGS
 from piazzi.formats.observations import Array, Observations, Segment
-from piazzi.text import nearest
+from piazzi.text import nearest, suggest
 from piazzi.units import Units
 
 RANGES = {"one-way": ("one-way", "sum"), "two-way": ("two-way", "half"), "round-trip": ("two-way", "sum")}
 RANGES |= {"three-way": ("three-way", "sum")}
+WORDS: Mapping[str, Iterable[str]] = {
+    "range": RANGES, "angles": ANGLES, "tag": TAGS[1:], "corrections": ("applied", "open"),
+    "interval_reference": ("start", "middle", "end"),
+}  # fmt: skip
 _SIGMA = re.compile(r"(?:(?P<kind>[a-z_]+)(?:\.(?P<station>[^=]+))?=)?(?P<number>[-+.0-9eE]+)\s*(?P<unit>[a-zA-Z/*^0-9]*)")
 
 
@@ -31,12 +35,16 @@ class Sigma:
 
 @dataclass(frozen=True)
 class Conventions:
-    """Answers to what files leave open.
+    """Answers to what files leave open; they never override what a file says.
 
     Attributes
     ----------
     range : ``one-way``, ``two-way`` (half of the way there and back), ``round-trip`` (all of it) or ``three-way``
     angles : ``astrometric``, ``geocentric`` or ``apparent``
+    tag : ``transmit``, ``bounce`` or ``receive``, what the times of rows are
+    frame : axes of directions and fixes
+    corrections : ``applied``, or ``open`` where they are still to be applied
+    interval, interval_reference : s over which rates are averaged, and the part of it that times are of
     scales : time scale by station, that of all others under ""
     sigmas : standard deviations
     options : whatever else one format asks for, by name
@@ -44,12 +52,17 @@ class Conventions:
 
     range: str | None = None
     angles: str | None = None
+    tag: str | None = None
+    frame: str | None = None
+    corrections: str | None = None
+    interval: float | None = None
+    interval_reference: str | None = None
     scales: tuple[tuple[str, str], ...] = ()
     sigmas: tuple[Sigma, ...] = ()
     options: tuple[tuple[str, Any], ...] = ()
 
     @classmethod
-    def of(cls, *, angles: Any = None, time: Any = None, sigma: Any = None, **options: Any) -> Conventions:
+    def of(cls, *, time: Any = None, sigma: Any = None, interval: Any = None, **words: Any) -> Conventions:
         """Conventions from words, as the command line and `read_tracking` take them.
 
         Raises
@@ -57,14 +70,14 @@ class Conventions:
         ValueError
             For a word that is none of those, with the nearest.
         """
-        legs = options.pop("range", None)
-        if legs is not None and legs not in RANGES:
-            raise ValueError(f"a range is {', '.join(RANGES)}, not {legs!r}{nearest(str(legs), RANGES)}")
-        if angles is not None and angles not in ANGLES:
-            raise ValueError(f"angles are {', '.join(ANGLES)}, not {angles!r}{nearest(str(angles), ANGLES)}")
+        chosen = {name: _word(name, words.pop(name, None)) for name in WORDS}
+        frame = words.pop("frame", None)
         scales = tuple(_scale(text) for text in _texts(time))
         sigmas = tuple(_sigma(text) for text in _texts(sigma))
-        return cls(legs, angles, scales, sigmas, tuple(options.items()))
+        seconds = None if interval is None else float(interval)
+        if seconds is not None and not 0 < seconds < np.inf:
+            raise ValueError(f"an interval is a positive number of seconds, not {interval!r}")
+        return cls(**chosen, frame=frame, interval=seconds, scales=scales, sigmas=sigmas, options=tuple(words.items()))
 
     def scale_of(self, station: str) -> str | None:
         """The time scale that the user says a station's dates are in."""
@@ -74,6 +87,13 @@ class Conventions:
     def option(self, name: str) -> Any:
         """What else was said, None where it was not."""
         return dict(self.options).get(name)
+
+
+def _word(name: str, word: Any) -> str | None:
+    if word is not None and word not in WORDS[name]:
+        what = name.replace("_", " ")
+        raise ValueError(f"{what} is one of {', '.join(WORDS[name])}, not {word!r}{suggest(str(word), WORDS[name])}")
+    return None if word is None else str(word)
 
 
 def _texts(given: Any) -> list[str]:
@@ -132,18 +152,34 @@ def with_conventions(observations: Observations, told: Conventions) -> Observati
     segments = tuple(_completed(segment, told) for segment in observations.segments)
     sigma = _sigmas(observations, told)
     all_known = bool(told.sigmas) and not np.isnan(sigma[observations.measured]).any()
-    answered = {"--range": told.range, "--angles": told.angles, "--sigma": all_known}
-    left = tuple(text for text in observations.open if not any(on and option in text for option, on in answered.items()))
-    return replace(observations, segments=segments, open=left, sigma=sigma)
+    answered = {f"--{name.replace('_', '-')}" for name in (*WORDS, "frame", "interval") if getattr(told, name) is not None}
+    answered |= {"--sigma"} if all_known else set()
+    left = tuple(text for text in observations.open if not any(option in text for option in answered))
+    return replace(observations, segments=segments, open=left, sigma=sigma, tag=_tags(observations, told))
 
 
 def _completed(segment: Segment, told: Conventions) -> Segment:
+    """A segment with what is said of it where it says nothing."""
+    new: dict[str, Any] = {
+        name: getattr(told, name)
+        for name in ("angles", "tag", "frame", "interval", "interval_reference")
+        if getattr(segment, name) is None and getattr(told, name) is not None
+    }
     if told.range is not None:
         way, range_is = RANGES[told.range]
-        segment = replace(segment, way=segment.way or way, range_is=segment.range_is or range_is)
-    if told.angles is not None:
-        segment = replace(segment, angles=segment.angles or told.angles)
-    return segment
+        new |= {"way": segment.way or way, "range_is": segment.range_is or range_is}
+    if told.corrections is not None:
+        applied = told.corrections == "applied"
+        new["corrections"] = tuple(c if c.applied is not None else c._replace(applied=applied) for c in segment.corrections)
+    return replace(segment, **new) if new else segment
+
+
+def _tags(observations: Observations, told: Conventions) -> Array:
+    """What the times of rows are, with the user's word for segments that do not say it."""
+    silent = np.array([segment.tag is None for segment in observations.segments], dtype=np.bool_)
+    if told.tag is None or not silent.any():
+        return observations.tag
+    return np.where(silent[observations.segment], np.int8(TAGS.index(told.tag)), observations.tag)
 
 
 def _sigmas(observations: Observations, told: Conventions) -> Array:

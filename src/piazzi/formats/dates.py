@@ -27,7 +27,7 @@ class Instants(NamedTuple):
 
 
 def instants(scale: str, readings: Readings, epoch: Epoch | None = None) -> Instants:
-    """Readings of one scale as seconds past an epoch: by default the whole second of the first.
+    """Readings of one scale as seconds past an epoch: by default the first without its fraction of a second.
 
     Raises
     ------
@@ -43,7 +43,8 @@ def instants(scale: str, readings: Readings, epoch: Epoch | None = None) -> Inst
         orientation = tables()
     whole, fraction = scales.to_tt(scale, *readings, orientation)
     if epoch is None:
-        epoch = Epoch.at(float(whole[0])) if len(whole) else Epoch.at(0.0)
+        first = scales.to_tt(scale, readings.day[:1], readings.seconds[:1], 0.0 * readings.day[:1], orientation)
+        epoch = Epoch.at(float(first[0][0]), float(first[1][0])) if len(whole) else Epoch.at(0.0)
     return Instants(epoch, (whole - epoch.whole) + (fraction - epoch.fraction))
 
 

@@ -46,6 +46,8 @@ FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "SP3": Format(_begins(rb"#[a-d][PV ]"), ephemeris="sp3:read"),
     "CPF": Format(_begins(_REMARKS + rb"[Hh]1\s+[Cc][Pp][Ff]\s"), ephemeris="cpf:read"),
     "CRD": Format(_begins(_REMARKS + rb"[Hh]1\s"), tracking="crd:read"),
+    "TDM": Format(_begins(rb"CCSDS_TDM_VERS\s*="), tracking="tdm:read_kvn"),
+    "TDM XML": Format(_root(rb"tdm"), tracking="tdm:read_xml"),
 }
 
 
@@ -104,9 +106,12 @@ def read_ephemeris(path: str | os.PathLike[str], **conventions: Any) -> Ephemeri
 
 def _opened(path: str | os.PathLike[str]) -> tuple[bytes, Format, str]:
     name, data = os.fspath(path), read_bytes(path)
-    if not data.strip():
+    if not data or data.isspace():
         raise ValueError(f"{name}: the file is empty")
     found = recognise(data)
+    if found is None and (doctype := data[:HEAD].find(b"<!DOCTYPE")) >= 0:
+        line = data.count(b"\n", 0, doctype) + 1
+        raise ValueError(f"{name}: line {line}: the file has a DOCTYPE, which may name other files; it is not read")
     if found is None:
         raise ValueError(f"{name}: line 1: the file is of no format that is known: {', '.join(_names())}")
     return data, FORMATS[found], name
