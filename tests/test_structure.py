@@ -88,11 +88,8 @@ def test_no_circle_of_modules():
     assert not [sorted(circle) for circle in circles if not any(circle <= left for left in LEFT)]
 
 
-# An estimate offers forecast and dataset as methods; the Kalman filter hands wide priors to its square-root form
-LEFT = {
-    frozenset(f"piazzi.estimate.{name}" for name in ("considered", "dataset", "estimator", "forecast")),
-    frozenset(f"piazzi.estimate.{name}" for name in ("kalman", "root")),
-}
+# An estimate offers forecast and dataset as methods
+LEFT = {frozenset(f"piazzi.estimate.{name}" for name in ("considered", "dataset", "estimator", "forecast"))}
 
 
 def name_of(module: Path) -> str:

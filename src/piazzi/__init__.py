@@ -8,31 +8,23 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from piazzi import earth, orbit
     from piazzi.earth import Epoch
-    from piazzi.estimate import (
-        Bank,
-        BatchLeastSquares,
-        Cauchy,
-        Estimate,
-        ExtendedKalmanFilter,
-        FactorGraph,
-        Forecast,
-        Huber,
-        LiveFilter,
-        LiveRootFilter,
-        LiveWindow,
-        Prediction,
-        SlidingWindow,
-        Smoother,
-        SquareRootKalmanFilter,
-        Tukey,
-        UnscentedKalmanFilter,
-        Updated,
-        predict,
-        update,
-    )
+    from piazzi.estimate.bank import Bank
+    from piazzi.estimate.batch import BatchLeastSquares
+    from piazzi.estimate.estimator import Estimate
+    from piazzi.estimate.factor_graph import FactorGraph
+    from piazzi.estimate.forecast import Forecast
+    from piazzi.estimate.kalman import ExtendedKalmanFilter, Prediction, Updated, predict, update
+    from piazzi.estimate.live import LiveFilter
+    from piazzi.estimate.live_root import LiveRootFilter
+    from piazzi.estimate.live_window import LiveWindow
     from piazzi.estimate.long_steps import step_warning
+    from piazzi.estimate.losses import Cauchy, Huber, Tukey
     from piazzi.estimate.prior import with_prior_at
+    from piazzi.estimate.sliding_window import SlidingWindow
+    from piazzi.estimate.smoother import Smoother
+    from piazzi.estimate.square_root import SquareRootKalmanFilter
     from piazzi.estimate.substeps import choose_substeps, substep_error
+    from piazzi.estimate.unscented import UnscentedKalmanFilter
     from piazzi.evaluate.comparison import Comparison, compare
     from piazzi.evaluate.observable import Observability
     from piazzi.evaluate.observing import observability
@@ -84,9 +76,20 @@ _WHERE = {
         "piazzi.problem": "Gaussian Manoeuvre Problem ProcessNoise Station Tracking Truth with_gauss_markov",
         "piazzi.orbit": "kepler_transition propagate_kepler",
         "piazzi.simulation": "simulate",
-        "piazzi.estimate": "Bank BatchLeastSquares Cauchy Estimate ExtendedKalmanFilter FactorGraph Forecast Huber LiveFilter "
-        "LiveRootFilter LiveWindow Prediction SlidingWindow Smoother SquareRootKalmanFilter Tukey UnscentedKalmanFilter "
-        "Updated predict update",
+        "piazzi.estimate.bank": "Bank",
+        "piazzi.estimate.batch": "BatchLeastSquares",
+        "piazzi.estimate.estimator": "Estimate",
+        "piazzi.estimate.factor_graph": "FactorGraph",
+        "piazzi.estimate.forecast": "Forecast",
+        "piazzi.estimate.kalman": "ExtendedKalmanFilter Prediction Updated predict update",
+        "piazzi.estimate.live": "LiveFilter",
+        "piazzi.estimate.live_root": "LiveRootFilter",
+        "piazzi.estimate.live_window": "LiveWindow",
+        "piazzi.estimate.losses": "Cauchy Huber Tukey",
+        "piazzi.estimate.sliding_window": "SlidingWindow",
+        "piazzi.estimate.smoother": "Smoother",
+        "piazzi.estimate.square_root": "SquareRootKalmanFilter",
+        "piazzi.estimate.unscented": "UnscentedKalmanFilter",
         "piazzi.estimate.long_steps": "step_warning",
         "piazzi.estimate.prior": "with_prior_at",
         "piazzi.estimate.substeps": "choose_substeps substep_error",

@@ -11,7 +11,8 @@ from piazzi.cli import options, output
 from piazzi.cli.running import DONE, NOT_ESTIMATED, say
 
 if TYPE_CHECKING:
-    from piazzi.estimate import Estimate, Forecast
+    from piazzi.estimate.estimator import Estimate
+    from piazzi.estimate.forecast import Forecast
     from piazzi.evaluate import Comparison
 
 SCHEMA = "piazzi.estimate/1"

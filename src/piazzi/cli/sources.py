@@ -18,7 +18,7 @@ from piazzi.cli.running import say
 from piazzi.problem import Problem, Tracking
 
 if TYPE_CHECKING:
-    from piazzi.estimate import Estimator
+    from piazzi.estimate.estimator import Estimator
     from piazzi.evaluate import Comparison
 
 
@@ -138,8 +138,9 @@ def _warning_of_steps(found: Source, comparison: Comparison, estimators: Mapping
     Judged by an estimator whose kernel this run has compiled anyway, where there is one: the filter, where it or a graph (which
     starts from it) is asked for, else the first that gives states in real time, else the filter.
     """
-    from piazzi.estimate import ExtendedKalmanFilter, FactorGraph
     from piazzi.estimate.estimator import views_of
+    from piazzi.estimate.factor_graph import FactorGraph
+    from piazzi.estimate.kalman import ExtendedKalmanFilter
     from piazzi.estimate.long_steps import step_warning
 
     truth = found.problem.truth

@@ -12,11 +12,10 @@ from piazzi import kernels
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain
 from piazzi.estimate.considered import nominal, with_considered
-from piazzi.estimate.determined import undetermined
-from piazzi.estimate.estimator import Estimate, View
+from piazzi.estimate.estimator import Estimate, Stopwatch, View
 from piazzi.estimate.factor_graph import FactorGraph
 from piazzi.estimate.gauss_newton import Outcome, optimize
-from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.estimate.width import undetermined
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.inputs import prepare, with_prior_node

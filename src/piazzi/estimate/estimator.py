@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 
 from piazzi.estimate.soundness import defect
+from piazzi.kernels import build_seconds
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, Locked
 
@@ -35,6 +37,17 @@ def views_of(estimator: Any) -> tuple[View, ...]:
     """The views of the states that an estimator gives: what its class says, else real time alone."""
     views: tuple[View, ...] = getattr(type(estimator), "views", ("realtime",))
     return views
+
+
+class Stopwatch:
+    """Wall-clock seconds since it was made, without those in which kernels were compiled or loaded."""
+
+    def __init__(self) -> None:
+        self._built, self._started = build_seconds(), time.perf_counter()
+
+    def seconds(self) -> float:
+        """Seconds so far."""
+        return time.perf_counter() - self._started - (build_seconds() - self._built)
 
 
 @dataclass(frozen=True, eq=False, init=False)

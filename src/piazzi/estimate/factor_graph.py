@@ -12,16 +12,14 @@ from piazzi.estimate.bank import Bank, search
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
 from piazzi.estimate.considered import nominal, with_considered
-from piazzi.estimate.determined import undetermined
-from piazzi.estimate.estimator import Estimate, View
+from piazzi.estimate.estimator import Estimate, Stopwatch, View
 from piazzi.estimate.gauss_newton import Outcome
 from piazzi.estimate.joint_mode import applies, bias_message, marginal
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.losses import Cauchy, loss_of
 from piazzi.estimate.robust import RobustChain, chain_for, gated_run, minimize, solve_at
 from piazzi.estimate.sliding_window import SlidingWindow
-from piazzi.estimate.stopwatch import Stopwatch
-from piazzi.estimate.width import DIFFUSE, NOT_BORDERED, TOO_WIDE
+from piazzi.estimate.width import DIFFUSE, NOT_BORDERED, TOO_WIDE, undetermined
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.inputs import Inputs, prepare, with_prior_node

@@ -12,10 +12,11 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.considered import with_considered
-from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.estimator import Estimate, Stopwatch
 from piazzi.estimate.guarded import Guard, GuardedLiveFilter, check_gate, guarded_run
 from piazzi.estimate.live import LiveFilter
-from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.estimate.root import linear_root, root_estimate
+from piazzi.estimate.soundness import check_start
 from piazzi.estimate.width import TOO_WIDE, too_wide
 from piazzi.kernels.bundle import Belief, Beliefs, Innovations, Interval
 from piazzi.problem import Gaussian, Problem, Tracking
@@ -110,8 +111,6 @@ class ExtendedKalmanFilter:
 
     def _in_root_form(self, problem: Problem, tracking: Tracking) -> Estimate:
         """The same filter with a square root of its covariance, for priors too wide for a covariance."""
-        from piazzi.estimate.root import linear_root, root_estimate
-
         return root_estimate(linear_root(self.gate), problem, tracking, {"solver": "square root"})
 
     def start(self, problem: Problem) -> LiveFilter:
@@ -137,15 +136,6 @@ def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tup
     if not isfinite(mean.item(0)):  # a failed update leaves no number of the state
         check_start(problem, inputs, mean[0])
     return mean, P, nu, S, seconds
-
-
-def check_start(problem: Problem, inputs: Inputs, first: Array) -> None:
-    """Raise ValueError where the very first update failed, so that `first` is not finite: the prior itself is."""
-    if all(map(isfinite, first.tolist())) or inputs.t_prior != inputs.t[0]:
-        return
-    names = sorted({problem.stations[s].name for s in inputs.station[: inputs.first_row[1]]})
-    at = ", ".join(f"{name} = {value:g}" for name, value in zip(problem.model.names, problem.mean, strict=True))
-    raise ValueError(f"station {', '.join(map(repr, names))} has no derivative at the prior mean ({at})")
 
 
 @dataclass(frozen=True, eq=False)

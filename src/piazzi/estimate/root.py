@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.estimator import Estimate, Stopwatch
 from piazzi.estimate.guarded import Guard
-from piazzi.estimate.kalman import check_start
-from piazzi.estimate.stopwatch import Stopwatch
+from piazzi.estimate.soundness import check_start
 from piazzi.kernels.bundle import Beliefs, Gate, Innovations, JointRoot, Measured, RootForm, Run
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem, Tracking

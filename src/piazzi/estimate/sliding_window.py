@@ -10,13 +10,11 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.considered import with_considered
-from piazzi.estimate.determined import undetermined
-from piazzi.estimate.estimator import Estimate, View
+from piazzi.estimate.estimator import Estimate, Stopwatch, View
 from piazzi.estimate.live_window import LiveWindow, window_opens
 from piazzi.estimate.losses import loss_of
 from piazzi.estimate.robust_window import loss_numbers, window_fragments
-from piazzi.estimate.stopwatch import Stopwatch
-from piazzi.estimate.width import NOT_BORDERED, TOO_WIDE, last_wide, too_wide
+from piazzi.estimate.width import NOT_BORDERED, TOO_WIDE, last_wide, too_wide, undetermined
 from piazzi.kernels.bundle import Beliefs, Chain, Innovations, Window
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking

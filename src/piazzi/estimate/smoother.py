@@ -11,11 +11,9 @@ from piazzi import kernels
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import chain_fragments
 from piazzi.estimate.considered import with_considered
-from piazzi.estimate.determined import undetermined
-from piazzi.estimate.estimator import Estimate, View
-from piazzi.estimate.kalman import check_start
-from piazzi.estimate.stopwatch import Stopwatch
-from piazzi.estimate.width import NOT_BORDERED, TOO_WIDE, too_wide
+from piazzi.estimate.estimator import Estimate, Stopwatch, View
+from piazzi.estimate.soundness import check_start
+from piazzi.estimate.width import NOT_BORDERED, TOO_WIDE, too_wide, undetermined
 from piazzi.kernels.bundle import Chain, Innovations, Smoothed
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking

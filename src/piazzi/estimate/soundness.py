@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import isfinite
 
 import numpy as np
 
+from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.inputs import Inputs
 
 INDEFINITE = 1e-9  # times n: an eigenvalue of correlations further below zero is none of rounding
 NOTHING = 5e-324  # the least number, for a variance of zero, so that a covariance beside it shows
@@ -62,3 +65,12 @@ def lowest_eigenvalues(P: Array) -> Array:
     lowest = np.full(len(P), -np.inf)
     lowest[there] = np.linalg.eigvalsh(correlations[there])[:, 0]
     return lowest
+
+
+def check_start(problem: Problem, inputs: Inputs, first: Array) -> None:
+    """Raise ValueError where the very first update failed, so that `first` is not finite: the prior itself is."""
+    if all(map(isfinite, first.tolist())) or inputs.t_prior != inputs.t[0]:
+        return
+    names = sorted({problem.stations[s].name for s in inputs.station[: inputs.first_row[1]]})
+    at = ", ".join(f"{name} = {value:g}" for name, value in zip(problem.model.names, problem.mean, strict=True))
+    raise ValueError(f"station {', '.join(map(repr, names))} has no derivative at the prior mean ({at})")

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate import Estimator, ExtendedKalmanFilter, FactorGraph
+from piazzi.estimate.estimator import Estimator
+from piazzi.estimate.factor_graph import FactorGraph
+from piazzi.estimate.kalman import ExtendedKalmanFilter
 from piazzi.evaluate.bounds import full_truth, posterior_bounds
 from piazzi.evaluate.information import propagated
 from piazzi.evaluate.metrics import rms_in_sigmas

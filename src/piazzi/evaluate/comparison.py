@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.estimate import Estimate, Estimator
-from piazzi.estimate.estimator import views_of
+from piazzi.estimate.estimator import Estimate, Estimator, views_of
 from piazzi.estimate.registry import by_name
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
 from piazzi.evaluate.comparison_table import html, render

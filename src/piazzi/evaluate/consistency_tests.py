@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from piazzi.estimate import Estimate
+from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.bounds import Linearized, linearized, linearized_rows, update_covariances
 from piazzi.evaluate.consistency import Check, bias_check, nees_check, nis_check, whiteness_check
 from piazzi.evaluate.metrics import Consistency, used

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate import Estimate
 from piazzi.estimate.chi_square import quantile
+from piazzi.estimate.estimator import Estimate
 from piazzi.problem.checks import Array
 
 _CHUNK = 1 << 14  # epochs at a time: the work space stays in the processor's cache

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from piazzi.estimate import FactorGraph
+from piazzi.estimate.factor_graph import FactorGraph
 from piazzi.evaluate.attempts import attempts
 from piazzi.evaluate.bounds import full_truth
 from piazzi.evaluate.information import Information, along, bound, factor, growth, singular

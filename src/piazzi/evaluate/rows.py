@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate import Estimate
+from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.bounds import Bounds
 from piazzi.evaluate.consistency import Check
 from piazzi.evaluate.consistency_tests import ConsistencyTests, check_consistency

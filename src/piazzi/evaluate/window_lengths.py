@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from piazzi.estimate import FactorGraph, SlidingWindow
+from piazzi.estimate.factor_graph import FactorGraph
+from piazzi.estimate.sliding_window import SlidingWindow
 from piazzi.evaluate.bounds import Bounds
 from piazzi.evaluate.comparison import bounds_of, failed
 from piazzi.evaluate.rows import Row, evaluate

@@ -20,7 +20,7 @@ from piazzi.text import escape_formula, nearest, unescape_formula
 from piazzi.units import Unit, Units
 
 if TYPE_CHECKING:
-    from piazzi.estimate import Estimate
+    from piazzi.estimate.estimator import Estimate
 
 TIME = "time"
 TRUTH = "truth:"

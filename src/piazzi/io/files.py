@@ -14,7 +14,7 @@ from piazzi.problem.checks import Array
 from piazzi.text import nearest
 
 if TYPE_CHECKING:
-    from piazzi.estimate import Estimate
+    from piazzi.estimate.estimator import Estimate
 
 RECORDINGS = (".nc", ".npz", ".csv")
 

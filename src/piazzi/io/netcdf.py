@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
-from piazzi.estimate import Estimate
 from piazzi.estimate.dataset import DETAIL, estimate_to_dataset, plain_details, tracking_to_dataset
-from piazzi.estimate.estimator import View
+from piazzi.estimate.estimator import Estimate, View
 from piazzi.io import hdf5
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array

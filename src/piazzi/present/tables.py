@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate import Estimate, Forecast
+from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.forecast import Forecast
 from piazzi.evaluate.grids import rich_table
 from piazzi.evaluate.metrics import errors, residual_rms
 from piazzi.evaluate.quantities import display_of, duration, number, with_sigma

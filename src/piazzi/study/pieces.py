@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate import ExtendedKalmanFilter
 from piazzi.estimate.estimator import views_of
+from piazzi.estimate.kalman import ExtendedKalmanFilter
 from piazzi.estimate.width import DIFFUSE, prior_ratio
 from piazzi.problem import Problem
 from piazzi.study.bound import bound_at, no_bound

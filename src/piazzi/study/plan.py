@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.estimate import SlidingWindow
 from piazzi.estimate.estimator import View, views_of
 from piazzi.estimate.registry import parse
+from piazzi.estimate.sliding_window import SlidingWindow
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.scenarios.write import problem_to_tables

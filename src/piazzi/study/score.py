@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from piazzi.estimate import Estimate
 from piazzi.estimate.chi_square import quantile
+from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.metrics import FAR, errors, known_truth, not_decreasing, squared_in_sigmas
 from piazzi.evaluate.rows import evaluate
 from piazzi.problem.checks import Array

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.estimate import Estimate
+from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.comparison import Comparison
 from piazzi.evaluate.metrics import errors, groups
 from piazzi.evaluate.quantities import Display, display_of, unit_of

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.estimate import Estimate
+from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.quantities import Display, display_of, unit_of
 from piazzi.present.figures.style import MEASURED, STATIONS, drawn, plain, shade_of, time_axis
 from piazzi.problem import Problem, Tracking

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from piazzi.estimate import Estimate
+from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.comparison import Comparison
 from piazzi.evaluate.metrics import errors, groups
 from piazzi.io.atomic import atomic_path

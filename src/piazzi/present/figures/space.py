@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.estimate import Estimate
+from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.metrics import known_truth
 from piazzi.evaluate.quantities import Display, display_of, unit_of
 from piazzi.present.figures.style import PLANET, TRUTH, drawn, label_of, line_of, plain, shade_of

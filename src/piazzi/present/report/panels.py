@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from piazzi.estimate import Estimate
+from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.metrics import groups
 from piazzi.evaluate.quantities import Display, display_of, unit_of
 from piazzi.present.colours import DASHES

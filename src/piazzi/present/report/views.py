@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from piazzi.estimate import Estimate
+from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate import Comparison
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
 from piazzi.evaluate.consistency_tests import LONGEST
