@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,11 @@ KINDS = (".npz", ".nc", ".csv", ".toml")
 
 
 def load(
-    source: str | os.PathLike[str], *, seed: int = 0, scenario: str | os.PathLike[str] | None = None
+    source: str | os.PathLike[str],
+    *,
+    seed: int = 0,
+    scenario: str | os.PathLike[str] | None = None,
+    scale: str | None = None,
 ) -> tuple[Problem, Tracking]:
     """Problem and tracking of a recording, or of a scenario simulated with `seed`.
 
@@ -29,6 +34,11 @@ def load(
         Of the simulation; recordings do not use it.
     scenario : name or path, optional
         The problem that a ``.csv`` measures.
+    scale : UTC, TAI, TT, TDB, TCG, GPS or UT1, optional
+        Of dates in a ``.csv`` that name none.
+
+    Dates become seconds past the problem's epoch.  One without an epoch, whose prior is at the first measurement, gets that of
+    the file.
 
     The prior of a scenario stands at the start of its ``[times]``, or at the ``time`` of its ``[prior]``.  For a recording that
     begins before that it is propagated back, see `with_prior_at`; for one that begins later, estimators propagate it forward.
@@ -40,7 +50,7 @@ def load(
     ValueError
         For an unknown scenario or a file with something wrong in it: what, the value, and where.
     """
-    problem, tracking = _loaded(os.fspath(source), seed, scenario)
+    problem, tracking = _loaded(os.fspath(source), seed, scenario, scale)
     with contextlib.suppress(ValueError):  # estimators say what does not fit
         prepare(problem, tracking)
     return problem, tracking
@@ -59,8 +69,12 @@ def _with_prior_before(text: str, problem: Problem, tracking: Tracking) -> tuple
         raise ValueError(f"{text}: {error}") from None
 
 
-def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None) -> tuple[Problem, Tracking]:
+def _loaded(
+    text: str, seed: int, scenario: str | os.PathLike[str] | None, scale: str | None
+) -> tuple[Problem, Tracking]:
     kind = Path(text).suffix.lower()
+    if scale is not None and kind != ".csv":
+        raise ValueError(f"{text}: --scale is for the dates of a .csv file")
     if scenario is not None and kind != ".csv":
         raise ValueError(f"{text}: only a .csv file is loaded with a scenario; this one holds its own problem")
     if kind == ".npz":
@@ -77,7 +91,10 @@ def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None) -> tu
         if scenario is None:
             raise ValueError(f"{text}: name the scenario that this .csv file measures: {', '.join(names())}, or a path")
         problem = load_scenario(scenario).problem
-        return _with_prior_before(text, problem, read_csv(text, problem))
+        tracking = read_csv(text, problem, scale)
+        if problem.epoch is None and tracking.epoch is not None:
+            problem = replace(problem, epoch=tracking.epoch)
+        return _with_prior_before(text, problem, tracking)
     if kind != ".toml" and os.path.isfile(text):
         raise ValueError(f"{text}: files end in {', '.join(KINDS)}, not {kind!r}")
     found = load_scenario(text)

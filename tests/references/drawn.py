@@ -103,6 +103,9 @@ def truths(draw, n, parameters, discrete):
     )
 
 
+EPOCHS = [None, pz.Epoch("2025-01-01T00:00:00 UTC"), pz.Epoch("JD 2451545 TDB"), pz.Epoch.at(-1.5e9, 0.12345678901234567)]
+
+
 @st.composite
 def trackings(draw, problem, *, first=0.0):
     """Measurements of a problem at irregular times, several at one epoch, some missing, with any finite doubles."""
@@ -124,7 +127,7 @@ def trackings(draw, problem, *, first=0.0):
         values,
         [problem.stations[s].name for s in index] if named else None,
         truth if draw(st.booleans()) else None,
-        draw(st.sampled_from(["", "2025-01-01T00:00:00", "J2000"])),
+        draw(st.sampled_from(EPOCHS)),
     )
 
 
@@ -138,7 +141,7 @@ def same_problem(p, q):
     """Whether two problems agree in everything, bit for bit."""
     arrays = ("mean", "covariance", "given", "station_sensor", "station_noise", "station_numbers")
     return (
-        (p.model, p.integrator, p.prior_time, p.name) == (q.model, q.integrator, q.prior_time, q.name)
+        (p.model, p.integrator, p.prior_time, p.name, p.epoch) == (q.model, q.integrator, q.prior_time, q.name, q.epoch)
         and [(s.name, s.sensor) for s in p.stations] == [(s.name, s.sensor) for s in q.stations]
         and all(same_bits(getattr(p, a), getattr(q, a)) for a in arrays)
         and same_noise(p.process_noise, q.process_noise)

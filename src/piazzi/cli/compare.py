@@ -22,6 +22,7 @@ DEFAULT = ("ekf", "graph", "window:100")
 @options.as_json
 @options.seed
 @options.scenario
+@options.scale
 @results.report_option
 def command(
     source: str,
@@ -30,6 +31,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
+    scale: str | None,
     report: str | None,
 ) -> int:
     """Compare several estimators on SOURCE.
@@ -49,7 +51,7 @@ def command(
     estimators = options.parsed(names, DEFAULT)
     from piazzi.cli.sources import run_comparison
 
-    source_name, comparison, warning = run_comparison(source, estimators, seed, scenario, bar=report is not None)
+    source_name, comparison, warning = run_comparison(source, estimators, seed, scenario, scale, bar=report is not None)
 
     def tab() -> Tab:
         from piazzi.present.report import comparison_tab

@@ -27,6 +27,7 @@ ENDINGS = (".json", ".csv", ".npz", ".nc")
 @options.as_json
 @options.seed
 @options.scenario
+@options.scale
 @click.option(
     "--predict",
     "ahead",
@@ -42,6 +43,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
+    scale: str | None,
     ahead: str | None,
     follow: str | None,
     checkpoint: str | None,
@@ -61,7 +63,7 @@ def command(
     if ahead is not None and follow is not None:
         raise click.UsageError("--predict and --follow do not go together", click.get_current_context())
     if follow is not None:
-        return _follow(source, options.parsed(names, (DEFAULT,)), output_file, as_json, follow, checkpoint)
+        return _follow(source, options.parsed(names, (DEFAULT,)), output_file, as_json, follow, checkpoint, scale)
     if checkpoint is not None:
         raise click.UsageError("--checkpoint goes with --follow", click.get_current_context())
     output.check_output(output_file, ENDINGS)
@@ -74,7 +76,7 @@ def command(
         times_ahead(ahead, 0.0)  # what cannot be read is told before anything is computed
     from piazzi.cli.sources import run_comparison
 
-    source_name, comparison, _ = run_comparison(source, estimators, seed, scenario, thorough=False)
+    source_name, comparison, _ = run_comparison(source, estimators, seed, scenario, scale, thorough=False)
     forecasts = {} if ahead is None else predicted(comparison, ahead)
     document = to_dict(comparison, forecasts)
     if output_file is not None:
@@ -91,7 +93,13 @@ def command(
 
 
 def _follow(
-    source: str, estimators: dict[str, Any], output_file: str | None, as_json: bool, stream: str, checkpoint: str | None
+    source: str,
+    estimators: dict[str, Any],
+    output_file: str | None,
+    as_json: bool,
+    stream: str,
+    checkpoint: str | None,
+    scale: str | None,
 ) -> int:
     """Follow a stream of measurements of the problem in SOURCE."""
     from piazzi.cli.follow import follow
@@ -100,7 +108,7 @@ def _follow(
     if len(estimators) > 1:
         raise click.UsageError("--follow runs one estimator: give one --with", click.get_current_context())
     output.check_output(output_file, (".jsonl",) if as_json else (".csv",))
-    return follow(load_problem(source), next(iter(estimators.values())), stream, output_file, checkpoint, as_json)
+    return follow(load_problem(source), next(iter(estimators.values())), stream, output_file, checkpoint, as_json, scale)
 
 
 def predicted(comparison: Comparison, ahead: str) -> dict[str, Forecast]:

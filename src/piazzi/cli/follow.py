@@ -26,10 +26,21 @@ if TYPE_CHECKING:
 
 BETWEEN_CHECKPOINTS = 0.05  # seconds: the file is synced to disk each time
 LONGEST_LINE = 2**16
+MOST_COMMENTS = 100
 
 
-def follow(problem: Problem, estimator: Any, source: str, output: str | None, checkpoint: str | None, as_json: bool) -> int:
+def follow(
+    problem: Problem,
+    estimator: Any,
+    source: str,
+    output: str | None,
+    checkpoint: str | None,
+    as_json: bool,
+    scale: str | None = None,
+) -> int:
     """Feed the lines of a file or of standard input to an estimator in progress; the exit status.
+
+    `scale` is that of dates that name none.
 
     A line that cannot be used is reported on stderr and skipped.  With a checkpoint file the run goes on where a killed one
     stood: a stream that begins as before is skipped to that place, and a file given by -o is cut back to it.  An estimate that
@@ -43,7 +54,7 @@ def follow(problem: Problem, estimator: Any, source: str, output: str | None, ch
 
     with ExitStack() as stack:
         stream: IO[bytes] = sys.stdin.buffer if source == STDIN else stack.enter_context(open(source, "rb"))
-        run = _Run(problem, estimator.start(problem), fingerprint(problem, estimator), checkpoint, as_json)
+        run = _Run(problem, estimator.start(problem), fingerprint(problem, estimator), checkpoint, as_json, scale)
         known = run.resume()
         run.sink = stack.enter_context(closing(Sink(output, known)))
         try:
@@ -67,6 +78,7 @@ class _Run:
     mark: Any
     checkpoint: str | None
     as_json: bool
+    scale: str | None = None
     sink: Sink = field(default_factory=lambda: Sink(None))
     lines: int = 0
     opening: bytes = b""
@@ -81,6 +93,7 @@ class _Run:
     failure: str = ""
     reader: RowReader | None = None
     first: list[bytes] = field(default_factory=list)
+    comments: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.consumed = hashlib.sha256()
@@ -134,6 +147,8 @@ class _Run:
             empty = not line.strip() or line.startswith(b"#")
             if not empty:
                 self._match_checkpoint(line)
+            elif self.reader is None and line.startswith(b"#"):
+                self.comments = [*self.comments[-MOST_COMMENTS:], line[1:].decode("utf-8", "replace").strip()]
             known = self._known()
             if not empty:
                 self._read(line, known)
@@ -172,7 +187,8 @@ class _Run:
         from piazzi.io.lines import RowReader
 
         if self.reader is None:
-            self.reader = RowReader.begin(self.problem, line.rstrip(b"\r\n"), self.lines)
+            header = line.rstrip(b"\r\n")
+            self.reader = RowReader.begin(self.problem, header, self.lines, self.comments, self.scale)
             self._begin_output()
         elif not known:
             self._update(self.reader, line)
@@ -202,16 +218,25 @@ class _Run:
 
     def _begin_output(self) -> None:
         if not self.as_json and not self.resumed:
-            names = self.problem.model.names
+            names, epoch = self.problem.model.names, self._epoch
+            if epoch is not None:
+                self.sink.emit(f"# epoch = {epoch.exact()}")
             self.sink.emit(",".join(["time", *names, *("sigma_" + n for n in names)]))
 
     def _write(self, row: Row) -> None:
         sigma = np.sqrt(np.diagonal(self.session.covariance)).tolist()
         mean, t = self.session.mean.tolist(), float(self.session.time)
         if self.as_json:
-            self.sink.emit(json.dumps({"time": t, "station": row.station, "mean": mean, "sigma": sigma}, allow_nan=False))
+            date = {} if self._epoch is None else {"date": str(self._epoch + t)}
+            said = {"time": t, **date, "station": row.station, "mean": mean, "sigma": sigma}
+            self.sink.emit(json.dumps(said, allow_nan=False))
         else:
             self.sink.emit(",".join(repr(v) for v in [t, *mean, *sigma]))
+
+    @property
+    def _epoch(self) -> Any:
+        """The instant that times are past, where the problem or the stream says one."""
+        return None if self.reader is None else self.reader.epoch
 
     def summary(self) -> str:
         """What became of the lines."""

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 @options.as_json
 @options.seed
 @options.scenario
+@options.scale
 @results.report_option
 def command(
     source: str,
@@ -30,6 +31,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
+    scale: str | None,
     report: str | None,
 ) -> int:
     """Analyse the observability of the first state in SOURCE.
@@ -52,7 +54,7 @@ def command(
     from piazzi.cli.sources import load_source
     from piazzi.evaluate.observing import observability
 
-    source_found = load_source(source, seed, scenario)
+    source_found = load_source(source, seed, scenario, scale)
     problem, tracking = source_found.problem, source_found.tracking
     add = additions(problem, added)
     found = observability(problem, tracking, add=add, twins=not no_twins, source=source_found.name)

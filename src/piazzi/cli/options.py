@@ -17,6 +17,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 source = click.argument("source", metavar="SOURCE")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, and nothing else there.")
 scenario = click.option("--scenario", metavar="NAME", help="Scenario that defines the problem for CSV input.")
+SCALES = ("UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1")
+scale = click.option(
+    "--scale",
+    metavar="SCALE",
+    type=click.Choice(SCALES, case_sensitive=False),
+    help=f"Time scale of dates in CSV input that name none: {', '.join(SCALES)}.",
+)
 STREAM = "-"
 
 

@@ -37,6 +37,7 @@ def _lags(context: click.Context, parameter: click.Parameter, text: str | None) 
 @click.option("--observability", "seen", is_flag=True, help="Also analyse the observability of the first state.")
 @options.seed
 @options.scenario
+@options.scale
 def command(
     sources: tuple[str, ...],
     names: tuple[str, ...],
@@ -45,6 +46,7 @@ def command(
     seen: bool,
     seed: int,
     scenario: str | None,
+    scale: str | None,
 ) -> int:
     """Compare estimators on each SOURCE and write one page.
 
@@ -65,9 +67,8 @@ def command(
 
     tabs, success = [], True
     for source in sources:
-        name, comparison, warning = run_comparison(
-            source, estimators, seed, scenario if source.lower().endswith(".csv") else None, bar=True
-        )
+        of_rows = (scenario, scale) if source.lower().endswith(".csv") else (None, None)
+        name, comparison, warning = run_comparison(source, estimators, seed, *of_rows, bar=True)
         title, radius = results.title_and_planet(source, name, scenario)
         more, well = _more(comparison, lags, seen)
         tabs.append(comparison_tab(comparison, title=title, planet_radius=radius, more=more, warning=warning))

@@ -23,6 +23,7 @@ ENDINGS = (".nc", ".csv", ".npz")
 @options.as_json
 @options.seed
 @options.scenario
+@options.scale
 @click.option(
     "--tolerance",
     type=options.number,
@@ -40,6 +41,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
+    scale: str | None,
     tolerance: float | None,
     truth: Literal["fixed", "drawn"] | None,
     perfect_guess: bool,
@@ -61,7 +63,7 @@ def command(
         raise click.UsageError("--json and -o - both want stdout", click.get_current_context())
     from piazzi.cli.sources import load_source
 
-    found = load_source(source, seed, scenario)
+    found = load_source(source, seed, scenario, scale)
     problem, tracking = found.problem, found.tracking
     if truth or perfect_guess or noiseless:
         from piazzi.scenarios import vary

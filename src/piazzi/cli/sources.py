@@ -37,7 +37,7 @@ class Source:
     recorded: bool
 
 
-def load_source(source: str, seed: int, scenario: str | None = None) -> Source:
+def load_source(source: str, seed: int, scenario: str | None = None, scale: str | None = None) -> Source:
     """What `piazzi.loading` makes of a source, or of standard input for "-"; raises as that does."""
     from piazzi import load
     from piazzi.io.files import RECORDINGS
@@ -47,13 +47,13 @@ def load_source(source: str, seed: int, scenario: str | None = None) -> Source:
     if source.lower().endswith(".csv") and not scenario:
         raise click.UsageError(f"{source}: --scenario NAME says what it measures", click.get_current_context(silent=True))
     if source != STDIN:
-        problem, tracking = load(source, seed=seed, scenario=scenario)
+        problem, tracking = load(source, seed=seed, scenario=scenario, scale=scale)
         found = Source(problem, tracking, os.path.basename(source) or source, source.lower().endswith(RECORDINGS))
         _say_moved_prior(found, scenario)
         return found
     path = _spooled(scenario)
     try:
-        problem, tracking = load(path, seed=seed, scenario=scenario)
+        problem, tracking = load(path, seed=seed, scenario=scenario, scale=scale)
     except (ValueError, OSError) as error:
         text = str(error) if isinstance(error, ValueError) else error.strerror or str(error)
         raise ValueError(text.replace(str(path), "standard input")) from None
@@ -112,6 +112,7 @@ def run_comparison(
     estimators: Mapping[str, Estimator],
     seed: int,
     scenario: str | None,
+    scale: str | None = None,
     *,
     bar: bool = False,
     thorough: bool = True,
@@ -123,7 +124,7 @@ def run_comparison(
     """
     from piazzi.evaluate import compare
 
-    found = load_source(source, seed, scenario)
+    found = load_source(source, seed, scenario, scale)
     with output.progress(len(estimators), long=bar or len(found.tracking.times) * len(estimators) > _LONG) as step:
         comparison = compare(found.problem, found.tracking, estimators, source=found.name, announce=step, thorough=thorough)
     warning = _warning_of_steps(found, comparison, estimators)

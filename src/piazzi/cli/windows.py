@@ -46,6 +46,7 @@ def whole_numbers(context: click.Context, parameter: click.Parameter, text: str)
 @options.as_json
 @options.seed
 @options.scenario
+@options.scale
 @results.report_option
 def command(
     source: str,
@@ -56,6 +57,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
+    scale: str | None,
     report: str | None,
 ) -> int:
     """Try sliding windows of several lengths on SOURCE.
@@ -73,7 +75,7 @@ def command(
     from piazzi.cli.sources import load_source
     from piazzi.evaluate.window_lengths import steps_of, windows
 
-    found = load_source(source, seed, scenario)
+    found = load_source(source, seed, scenario, scale)
     problem, tracking = found.problem, found.tracking
     steps = steps_of(lags, tracking, graph=not no_graph)
     with output.progress(steps, long=len(tracking.times) * sum(lags) > _LONG) as step:

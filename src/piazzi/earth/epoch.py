@@ -54,7 +54,7 @@ class Epoch:
             if scale is not None and reading.scale != scale:
                 raise ValueError(f"date {when!r} is in {reading.scale}, and {scale} was said beside it")
             day, seconds, part = (np.array(value) for value in reading[1:])
-            one, two = scales.to_tt(reading.scale, day, seconds, part, _orientation(reading.scale))
+            one, two = scales.to_tt(reading.scale, day, seconds, part, orientation(reading.scale))
             whole, fraction = float(one), float(two)
         object.__setattr__(self, "whole", whole)
         object.__setattr__(self, "fraction", fraction)
@@ -84,7 +84,7 @@ class Epoch:
         reading = np.array(day), np.array(np.floor(seconds)), np.array(seconds - np.floor(seconds))
         if scale == "UTC" and day < scales.UTC_BEGINS:
             raise ValueError(f"JD {one!r} + {two!r}: there is no UTC before 1960; give it in UT1 or TT")
-        one_tt, two_tt = scales.to_tt(scale, *reading, _orientation(scale))
+        one_tt, two_tt = scales.to_tt(scale, *reading, orientation(scale))
         return cls.at(float(one_tt), float(two_tt))
 
     def reading(self, scale: str, eop: Orientation | None = None) -> Reading:
@@ -93,12 +93,21 @@ class Epoch:
         if scale == "UTC" and self.whole < -1262347200.0 + 30.0:
             raise ValueError(f"{self.to('TT')}: there is no UTC before 1960; ask for UT1 or TT")
         instant = np.array(self.whole), np.array(self.fraction)
-        day, seconds, fraction = scales.reading(scale, *instant, _orientation(scale, eop))
+        day, seconds, fraction = scales.reading(scale, *instant, orientation(scale, eop))
         return Reading(scale, float(day), float(seconds), float(fraction))
 
     def to(self, scale: str, eop: Orientation | None = None, digits: int = 9) -> str:
         """The date in a scale, ISO 8601 with at most `digits` decimals and the scale's name, as `Epoch` reads it."""
         return write_date(*self.reading(scale, eop), digits)
+
+    def exact(self) -> str:
+        """The shortest text that `Epoch` reads back to the same instant in all bits: in UTC, or in TT with all decimals."""
+        text = str(self)
+        if Epoch(text) == self:
+            return text
+        _, day, seconds, fraction = self.reading("TT")
+        whole = write_date("TT", day, seconds, 0.0).removesuffix(" TT")
+        return f"{whole}{np.format_float_positional(fraction, trim='-').removeprefix('0')} TT"
 
     def jd(self, scale: str = "TT", eop: Orientation | None = None) -> tuple[float, float]:
         """Julian date in a scale as two numbers, the first that of 0h; in UTC the quasi-Julian date of SOFA."""
@@ -145,7 +154,7 @@ class Epoch:
         return f"Epoch({str(self)!r})"
 
 
-def _orientation(scale: str, eop: Orientation | None = None) -> Orientation | None:
+def orientation(scale: str, eop: Orientation | None = None) -> Orientation | None:
     """The tables of the IERS where UT1 is asked for and nothing else is given; nobody else waits for them."""
     return tables() if scale == "UT1" and eop is None else eop
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.epochs import epoch_of
 
 if TYPE_CHECKING:
     import xarray
@@ -32,7 +33,7 @@ def tracking_to_dataset(problem: Problem, tracking: Tracking) -> xarray.Dataset:
     if tracking.truth is not None:
         own = "state" if tracking.truth.shape[1] == problem.model.n else "true_state"
         variables["truth"] = (("time", own), tracking.truth, {"long_name": "true state"})
-    return xr.Dataset(variables, coordinates, {"title": _label(problem.name)})
+    return xr.Dataset(variables, coordinates, {"title": _label(problem.name), **_instant(problem, tracking)})
 
 
 def estimate_to_dataset(estimate: Estimate) -> xarray.Dataset:
@@ -58,6 +59,7 @@ def estimate_to_dataset(estimate: Estimate) -> xarray.Dataset:
     attributes = {
         "view": estimate.view, "iterations": int(estimate.iterations), "seconds": float(estimate.seconds),
         "success": int(estimate.success), "message": _label(estimate.message), "details": json.dumps(plain_details(estimate)),
+        **_instant(problem, tracking),
     }  # fmt: skip
     return xr.Dataset(variables, coordinates | {"state_2": ("state_2", names)}, attributes)
 
@@ -92,13 +94,20 @@ def _places(problem: Problem, width: int) -> dict[str, Any]:
 
 def _epochs(problem: Problem, tracking: Tracking) -> dict[str, Any]:
     names = problem.model.names
-    since = f" since {tracking.epoch}" if tracking.epoch else ""
+    epoch = epoch_of(problem, tracking)
+    since = "" if epoch is None else f" of TT past {epoch.exact()}"
     units = np.array([problem.model.unit(name) for name in names], dtype=object)
     return {
         "time": ("time", tracking.times, {"units": "s", "long_name": f"seconds{since}"}),
         "state": ("state", np.array(names, dtype=object)),
         "unit": ("state", units, {"long_name": "unit of each state"}),
     }
+
+
+def _instant(problem: Problem, tracking: Tracking) -> dict[str, Any]:
+    """The instant that times are past: as text with its scale, and as whole seconds of TT past J2000.0 and a fraction."""
+    epoch = epoch_of(problem, tracking)
+    return {} if epoch is None else {"epoch": epoch.exact(), "epoch_tt": np.array([epoch.whole, epoch.fraction])}
 
 
 def _label(text: str) -> str:

@@ -14,10 +14,12 @@ from piazzi.estimate.soundness import defect
 from piazzi.kernels import build_seconds
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, Locked
+from piazzi.problem.epochs import epoch_of
 
 if TYPE_CHECKING:
     import xarray
 
+    from piazzi.earth import Epoch
     from piazzi.estimate.forecast import Forecast
 
 View = Literal["realtime", "delayed"]
@@ -120,6 +122,11 @@ class Estimate(Locked):
     @property
     def times(self) -> Array:
         return self.tracking.times
+
+    @property
+    def epoch(self) -> Epoch | None:
+        """The instant that `times` are seconds of TT past, where there is one."""
+        return epoch_of(self.problem, self.tracking)
 
     @property
     def names(self) -> tuple[str, ...]:

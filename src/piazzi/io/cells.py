@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,11 +18,14 @@ from piazzi.problem.checks import Array
 from piazzi.scenarios.table import shown
 
 STATION = "station"
+TIME = "time"
 MAX_BYTES = 2**32
 MAX_COLUMNS = 1000
 _ODD = (b'"', b"\r", b"\0")
 _WORDS = (b"rue", b"RUE", b"alse", b"ALSE")  # true and false are numbers to pandas, but not to us
 PIECE = 2**18  # bytes that are looked at together: what stays in a cache
+LONGEST_DATE = 60
+_DATE = re.compile(r"\s*(\d{4}-\d|M?JD\s*\d)")
 SMALL = 2**19  # bytes for which the careful way takes less time than importing pandas
 
 
@@ -34,6 +39,8 @@ class Cells:
     numbers : column name -> (J,) values, NaN where empty
     station : (J,) indices into `station_names`, None without such a column
     lines : line of the file that each row is in
+    dates : (J,) texts of the column of time, as bytes, where it has dates; it is not among the numbers then
+    scale : what the name of that column says of the time scale, None where it says nothing
     """
 
     comments: tuple[str, ...]
@@ -41,6 +48,8 @@ class Cells:
     station: Array | None
     station_names: tuple[str, ...]
     lines: Sequence[int]
+    dates: Array | None = None
+    scale: str | None = None
 
 
 def read_cells(path: str | os.PathLike[str]) -> Cells:
@@ -112,7 +121,8 @@ def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -
         return None
     import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 
-    kinds = {i: str if name == STATION else float for i, name in enumerate(header)}
+    texts = dated(header, body[: body.find(b"\n")].split(b","))
+    kinds = {i: str if name == STATION or i == texts.column else float for i, name in enumerate(header)}
     try:
         table = pd.read_csv(
             io.BytesIO(body), header=None, index_col=False, dtype=kinds, na_values=[""], keep_default_na=False,
@@ -120,7 +130,7 @@ def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -
         )  # fmt: skip
     except (ValueError, OverflowError):  # among them all of pandas' own errors of parsing
         return None
-    numbers = {name: np.ascontiguousarray(table[i], dtype=float) for i, name in enumerate(header) if name != STATION}
+    numbers = {name: np.ascontiguousarray(table[i], dtype=float) for i, name in enumerate(header) if kinds[i] is float}
     if any(_is_binary(column) for column in numbers.values()) and any(word in body for word in _WORDS):
         return None
     station: Array | None = None
@@ -130,7 +140,15 @@ def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -
         station, names = _merged(np.asarray(codes, dtype=np.int64), [str(name).strip() for name in given])
         if "" in names or (station < 0).any():
             return None
-    return Cells(comments, numbers, station, names, range(line, line + len(table)))
+    dates = None
+    if texts.column >= 0:
+        if table[texts.column].isna().any():
+            return None  # the careful way says in which line a date is missing
+        try:
+            dates = as_bytes(table[texts.column].to_numpy())
+        except ValueError:
+            return None
+    return Cells(comments, numbers, station, names, range(line, line + len(table)), dates, texts.scale)
 
 
 def _exact(version: str) -> dict[str, str]:
@@ -176,6 +194,8 @@ def _merged(index: Array, given: list[str]) -> tuple[Array, tuple[str, ...]]:
 def parse_rows(body: bytes, line: int, header: list[str], comments: tuple[str, ...] = ()) -> Cells:
     """The table row by row; raises ValueError at the first cell that does not fit."""
     text = _decoded(body, line)
+    texts: Dated | None = None
+    dates: list[str] = []
     columns: dict[str, list[float]] = {name: [] for name in header if name != STATION}
     stations: dict[str, int] = {}
     station: list[int] = []
@@ -189,17 +209,64 @@ def parse_rows(body: bytes, line: int, header: list[str], comments: tuple[str, .
             if len(row) != len(header):
                 cells = f"{len(row)} cell{'s' * (len(row) != 1)}"
                 raise ValueError(f"line {at} has {cells}; the header names {len(header)} ({', '.join(header)[:200]})")
-            for name, cell in zip(header, row, strict=True):
-                if name == STATION:
+            texts = texts or dated(header, row)
+            for i, (name, cell) in enumerate(zip(header, row, strict=True)):
+                if i == texts.column:
+                    dates.append(_date(cell, at))
+                elif name == STATION:
                     station.append(stations.setdefault(_name(cell, at), len(stations)))
                 else:
                     columns[name].append(_number(cell, name, at))
             lines.append(at)
     except csv.Error as error:
         raise ValueError(f"line {line + reader.line_num - 1}: {error}") from None
-    numbers = {name: np.array(column, dtype=float) for name, column in columns.items()}
+    texts = texts or dated(header, ())
+    given = {name: column for name, column in columns.items() if header.index(name) != texts.column}
+    numbers = {name: np.array(column, dtype=float) for name, column in given.items()}
     index = np.array(station, dtype=np.int64) if STATION in header else None
-    return Cells(comments, numbers, index, tuple(stations), lines)
+    text = as_bytes(np.array(dates, dtype=object)) if texts.column >= 0 else None
+    return Cells(comments, numbers, index, tuple(stations), lines, text, texts.scale)
+
+
+class Dated(NamedTuple):
+    """Which column holds dates, -1 for none, and the scale that its name gives them."""
+
+    column: int
+    scale: str | None
+
+
+def dated(header: Sequence[str], first: Sequence[str] | Sequence[bytes]) -> Dated:
+    """Whether the column of time holds dates, by its name, as ``time[UTC]``, or else by its first cell."""
+    at = next((i for i, name in enumerate(header) if name.partition("[")[0].strip() == TIME), -1)
+    if at < 0:
+        return Dated(-1, None)
+    unit = header[at].partition("[")[2].rstrip("] ").strip()
+    if unit and unit != "s":
+        from piazzi.earth.scales import SCALES  # only those wait for it who may have dates
+
+        if unit.upper() in SCALES:
+            return Dated(at, unit.upper())
+    cell = first[at] if at < len(first) else ""
+    text = cell.decode("utf-8", "replace") if isinstance(cell, bytes) else cell
+    return Dated(at if not unit and _DATE.match(text) else -1, None)
+
+
+def as_bytes(texts: Array) -> Array:
+    """Texts without blanks around them as an array of bytes; raises ValueError where one is long, or not ASCII."""
+    out = np.array([text.strip() for text in texts.tolist()] or [""], dtype=np.bytes_)
+    if out.dtype.itemsize > LONGEST_DATE:
+        raise ValueError(f"a date has {out.dtype.itemsize} characters; at most {LONGEST_DATE} are read")
+    return out[: len(texts)]
+
+
+def _date(cell: str, line: int) -> str:
+    """The text of a date, which may be any short one."""
+    text = cell.strip()
+    if not text:
+        raise ValueError(f"line {line}: the time is missing; it must be a date")
+    if not text.isascii() or len(text) > LONGEST_DATE:
+        raise ValueError(f"line {line}: the time is {shown(cell)}; it must be a date such as 2016-02-13T16:00:00 UTC")
+    return text
 
 
 def _split(text: str) -> list[str]:

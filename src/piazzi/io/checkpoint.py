@@ -28,6 +28,8 @@ def fingerprint(problem: Problem, estimator: object) -> Array:
     noise = problem.process_noise
     kind = (noise.per, noise.method, noise.axes)
     words = repr((problem.model, problem.integrator, problem.prior_time, [s.name for s in problem.stations], kind, estimator))
+    if problem.epoch is not None:  # those without one keep the digest that they had
+        words += problem.epoch.exact()
     digest = hashlib.sha256(numbers + words.encode()).digest()
     return np.frombuffer(digest, dtype=np.uint8).astype(float)
 

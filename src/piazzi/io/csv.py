@@ -7,28 +7,29 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from piazzi.io.atomic import atomic_path
-from piazzi.io.cells import STATION, Cells, read_cells
+from piazzi.io.cells import STATION, TIME, Cells, read_cells
+from piazzi.io.dates import EPOCH, times_of
 from piazzi.problem import Problem, Tracking
-from piazzi.problem.checks import Array, backwards, check_span
+from piazzi.problem.checks import Array
+from piazzi.problem.epochs import epoch_of
 from piazzi.text import escape_formula, nearest, unescape_formula
 from piazzi.units import Unit, Units
 
 if TYPE_CHECKING:
     from piazzi.estimate.estimator import Estimate
 
-TIME = "time"
 TRUTH = "truth:"
-EPOCH = "epoch = "
 _UNIT = re.compile(r"(.*?)\s*\[([^\[\]]*)\]")
 
 
-def read_csv(path: str | os.PathLike[str], problem: Problem) -> Tracking:
+def read_csv(path: str | os.PathLike[str], problem: Problem, scale: str | None = None) -> Tracking:
     """The measurements in a file, of a problem's stations.
 
     The first line names the columns: ``time``, ``station`` (not needed where there is one), the components of the sensors,
@@ -36,6 +37,9 @@ def read_csv(path: str | os.PathLike[str], problem: Problem) -> Tracking:
     needs may be empty, but not absent.  A name behind an apostrophe, as spreadsheets are kept from formulas, is that name.
     Numbers are in SI and radians (in the model's own units, where one made in Python names others), or in the unit that a
     column names, as in ``bearing [deg]``, which must be of the column's kind.
+
+    Times are seconds, or dates with their scale: in each cell, as the unit of the column, ``time[UTC]``, or as `scale`.  See
+    `times_of` for what they are counted from.  Where file and problem each have an epoch, times become those past the problem's.
 
     Raises
     ------
@@ -45,7 +49,7 @@ def read_csv(path: str | os.PathLike[str], problem: Problem) -> Tracking:
         For columns, stations or cells that do not fit; the message names the file and the line.
     """
     try:
-        return cells_to_tracking(read_cells(path), problem)
+        return cells_to_tracking(read_cells(path), problem, scale)
     except ValueError as error:
         raise ValueError(f"{os.fspath(path)}: {error}") from None
 
@@ -74,8 +78,13 @@ def write_csv(path: str | os.PathLike[str], problem: Problem, tracking: Tracking
     if len(set(header)) < len(header):
         twice = next(h for h in header if header.count(h) > 1)
         raise ValueError(f"two columns would be called {twice!r}: rename the component")
-    epoch_line = [EPOCH + " ".join(tracking.epoch.split())] if tracking.epoch else []
-    write_rows(path, header, columns, epoch_line)
+    write_rows(path, header, columns, epoch_lines(problem, tracking))
+
+
+def epoch_lines(problem: Problem, tracking: Tracking) -> list[str]:
+    """The comment that says what times are seconds of TT past; none where nothing is known of it."""
+    epoch = epoch_of(problem, tracking)
+    return [] if epoch is None else [EPOCH + epoch.exact()]
 
 
 def write_estimate_csv(path: str | os.PathLike[str], estimate: Estimate) -> None:
@@ -89,7 +98,8 @@ def write_estimate_csv(path: str | os.PathLike[str], estimate: Estimate) -> None
         for j in range(i, len(names)):
             header.append(f"cov_{name}_{names[j]}")
             columns.append(_written(P[:, i, j]))
-    write_rows(path, header, columns, [f"view = {estimate.view}"])
+    comments = [f"view = {estimate.view}", *epoch_lines(estimate.problem, estimate.tracking)]
+    write_rows(path, header, columns, comments)
 
 
 def write_rows(
@@ -134,7 +144,7 @@ def _in_own_units(cells: Cells, problem: Problem) -> Cells:
             raise ValueError(f"two columns are called {label!r}")
         with np.errstate(over="ignore"):
             numbers[label] = column if factor == 1.0 else column * factor
-    return Cells(cells.comments, numbers, cells.station, tuple(map(unescape_formula, cells.station_names)), cells.lines)
+    return replace(cells, numbers=numbers, station_names=tuple(map(unescape_formula, cells.station_names)))
 
 
 def _factor(column: str, label: str, text: str, problem: Problem) -> float:
@@ -174,19 +184,13 @@ def _own_units(label: str, problem: Problem) -> dict[str, Unit | None]:
     return out
 
 
-def cells_to_tracking(cells: Cells, problem: Problem) -> Tracking:
+def cells_to_tracking(cells: Cells, problem: Problem, scale: str | None = None) -> Tracking:
     """The measurements in a table; raises ValueError for columns, stations or cells that do not fit the problem."""
-    return _tracking(_in_own_units(cells, problem), problem)
-
-
-def _tracking(cells: Cells, problem: Problem) -> Tracking:
+    cells = _in_own_units(cells, problem)
     if not problem.stations:
         raise ValueError("the problem has no stations, so nothing can be measured")
     _check_columns(cells, problem)
-    times = cells.numbers[TIME]
-    if not times.size:
-        raise ValueError("there are no measurements: only a header")
-    _check_times(cells, times)
+    times, epoch, _ = times_of(cells, problem, scale)
     station = _stations(cells, problem)
     values = _values(cells, problem, station)
     _check_components(cells, problem, station)
@@ -195,8 +199,8 @@ def _tracking(cells: Cells, problem: Problem) -> Tracking:
     states = problem.model.names
     known = TRUTH + states[0] in cells.numbers
     truth = np.column_stack([_true(cells, s)[first] for s in states]) if known else None
-    epoch = next((c.removeprefix(EPOCH) for c in cells.comments if c.startswith(EPOCH)), "")
-    return Tracking(times, values, names, truth, epoch)
+    tracking = Tracking(times, values, names, truth, epoch)
+    return tracking if None in (epoch, problem.epoch) else tracking.with_epoch(problem.epoch)
 
 
 def _true(cells: Cells, state: str) -> Array:
@@ -217,7 +221,7 @@ def _check_columns(cells: Cells, problem: Problem) -> None:
     for name in cells.numbers:
         if name not in valid:
             raise ValueError(f"unknown column {name[:60]!r}{nearest(name[:60], valid)}")
-    if TIME not in cells.numbers:
+    if TIME not in cells.numbers and cells.dates is None:
         raise ValueError(f"there is no column {TIME!r}")
     if not components & cells.numbers.keys():
         raise ValueError(f"there is no column of measurements ({', '.join(sorted(components))})")
@@ -238,21 +242,10 @@ def _check_components(cells: Cells, problem: Problem, station: Array) -> None:
                 raise ValueError(f"there is no column {name!r}, {who}: add it, empty where nothing was measured")
 
 
-def _check_times(cells: Cells, times: Array) -> None:
-    bad = np.flatnonzero(~np.isfinite(times))
-    if bad.size:
-        what = "is missing" if np.isnan(times[bad[0]]) else f"is {times[bad[0]]}"
-        raise ValueError(f"line {cells.lines[bad[0]]}: the time {what}; it must be finite")
-    i = backwards(times)
-    if i is not None:
-        raise ValueError(f"line {cells.lines[i]}: times must increase, but {times[i]:g} s comes after {times[i - 1]:g} s")
-    check_span(times[0], times[-1], f"line {cells.lines[-1]}")
-
-
 def _stations(cells: Cells, problem: Problem) -> Array:
     """Index of every row's station into the problem's."""
     if cells.station is None:
-        return np.zeros(len(cells.numbers[TIME]), dtype=np.int64)
+        return np.zeros(len(cells.lines), dtype=np.int64)
     known = [s.name for s in problem.stations]
     for i, name in enumerate(cells.station_names):
         if name not in known:

@@ -92,10 +92,13 @@ def load_estimate(path: str | os.PathLike[str]) -> Estimate:
 
 
 def _arrays(estimate: Estimate) -> Mapping[str, Array]:
-    out = {
+    out: dict[str, Array] = {
         "times": estimate.times, "names": np.array(estimate.names), "mean": estimate.mean, "covariance": estimate.covariance,
         "innovations": estimate.innovations, "innovation_covariances": estimate.innovation_covariances,
     }  # fmt: skip
+    from piazzi.io.npz import instant
+
+    out |= instant(estimate.problem, estimate.tracking)
     if estimate.delayed is not None:
         out |= {"delayed_mean": estimate.delayed.mean, "delayed_covariance": estimate.delayed.covariance}
     return out

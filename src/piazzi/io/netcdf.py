@@ -19,6 +19,7 @@ from piazzi.estimate.estimator import Estimate, View
 from piazzi.io import hdf5
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.epochs import epoch_given
 from piazzi.scenarios.table import Faults, Table, shown
 from piazzi.scenarios.write import problem_from_tables, problem_to_tables
 
@@ -71,7 +72,8 @@ def read_estimate(path: str | os.PathLike[str]) -> Estimate:
 
 def _root(problem: Problem, tracking: Tracking) -> xarray.Dataset:
     named = tracking.row_stations is not None
-    about = {"format": FORMAT, "name": problem.name, "epoch": tracking.epoch, "stations_named": named}
+    epoch = "" if tracking.epoch is None else tracking.epoch.exact()
+    about = {"format": FORMAT, "name": problem.name, "epoch": epoch, "stations_named": named}
     return _with_json(tracking_to_dataset(problem, tracking), about=about, problem=problem_to_tables(problem))
 
 
@@ -111,12 +113,15 @@ def _content(root: Any) -> tuple[Problem, Tracking]:
     if about.text("format") != FORMAT:
         kind = "format" if about.raw("format") is not None else "schema"  # a study has one, and no measurements
         raise ValueError(f"it holds no measurements: its {kind} is {shown(about.raw(kind))}; Piazzi reads {FORMAT!r}")
-    name, epoch, named = about.text("name", ""), about.text("epoch", ""), about.flag("stations_named", False)
+    name, named = about.text("name", ""), about.flag("stations_named", False)
+    epoch: Any = about.text("epoch", "")
+    with faults.at("about.epoch"):
+        epoch = epoch_given(epoch)
     _raise_first(faults)
     problem = problem_from_tables(hdf5.document(root, "problem"), name or "", "variable 'problem'")
     times, values, truth = hdf5.array(root, "row_time"), hdf5.array(root, "value"), hdf5.array(root, "truth", required=False)
     stations = _stations(root, problem) if named else None
-    return problem, Tracking(times, values, stations, truth, epoch or "")
+    return problem, Tracking(times, values, stations, truth, epoch)
 
 
 def _stations(root: Any, problem: Problem) -> Array:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from math import ceil
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,10 +15,16 @@ from piazzi.io.atomic import atomic_path
 from piazzi.kernels import ConstantAcceleration
 from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Tracking, Truth
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
+from piazzi.problem.epochs import epoch_of
 from piazzi.scenarios import load_scenario
+
+if TYPE_CHECKING:
+    from piazzi.earth import Epoch
 
 BASE = "satellite-bearing"
 REQUIRED = ("R", "Q", "dt", "meas", "x0", "P0")
+EPOCH = "epoch_tt"
+_MOST_SECONDS = 6e10  # of the years that calendars have four digits for
 MAX_SUBSTEPS = 10**10
 
 
@@ -25,7 +32,7 @@ def read_npz(path: str | os.PathLike[str]) -> tuple[Problem, Tracking]:
     """Problem and tracking of a file in the founding layout.
 
     Keys: R (variance, rad^2), Q (4, 4) per second, dt (s), meas (K,) bearings (rad), x0 (4,), P0 (4, 4), and truth (K, 4),
-    which may be missing.  The problem is satellite-bearing with these numbers: ceil(dt) Taylor substeps, Q dt per step,
+    and epoch_tt (2,), seconds of TT past J2000.0 of time zero; the last two may be missing.  The problem is satellite-bearing with these numbers: ceil(dt) Taylor substeps, Q dt per step,
     epochs at k dt, and a measurement at every one of them.
 
     Raises
@@ -35,9 +42,10 @@ def read_npz(path: str | os.PathLike[str]) -> tuple[Problem, Tracking]:
     ValueError
         Where it is no such file, or holds other than finite numbers of these shapes; the message names file and key.
     """
-    arrays = read_arrays(path, (*REQUIRED, "truth"), REQUIRED)
+    arrays = read_arrays(path, (*REQUIRED, "truth", EPOCH), REQUIRED)
     try:
-        return _problem(arrays), _tracking(arrays)
+        epoch = _epoch(arrays)
+        return replace(_problem(arrays), epoch=epoch), replace(_tracking(arrays), epoch=epoch)
     except ValueError as error:
         raise ValueError(f"{os.fspath(path)}: {error}") from None
 
@@ -110,7 +118,24 @@ def write_npz(path: str | os.PathLike[str], problem: Problem, tracking: Tracking
         "R": problem.stations[0].noise[0, 0], "Q": problem.process_noise.covariance, "dt": _step(problem, tracking.times),
         "meas": tracking.values[:, 0], "x0": problem.prior.mean, "P0": problem.prior.covariance,
     }  # fmt: skip
-    write_arrays(path, arrays if tracking.truth is None else {**arrays, "truth": tracking.truth})
+    write_arrays(path, arrays | ({} if tracking.truth is None else {"truth": tracking.truth}) | instant(problem, tracking))
+
+
+def instant(problem: Problem, tracking: Tracking) -> dict[str, Array]:
+    """The epoch, where there is one, as whole seconds of TT past J2000.0 and a fraction, and beside it as text."""
+    epoch = epoch_of(problem, tracking)
+    return {} if epoch is None else {EPOCH: np.array([epoch.whole, epoch.fraction]), "epoch": np.array(epoch.exact())}
+
+
+def _epoch(arrays: dict[str, Array]) -> Epoch | None:
+    if EPOCH not in arrays:
+        return None
+    found = arrays[EPOCH]
+    if found.shape != (2,) or not (abs(found[0]) < _MOST_SECONDS and 0 <= found[1] < 1):
+        raise ValueError(f"key {EPOCH!r} is {_shown(found)}; it must be whole seconds of TT past J2000.0, and a fraction")
+    from piazzi.earth.epoch import Epoch
+
+    return Epoch.at(*found.tolist())
 
 
 def write_arrays(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:

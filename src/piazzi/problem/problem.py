@@ -16,6 +16,7 @@ from piazzi.model import Model
 from piazzi.problem import evaluation, manoeuvres
 from piazzi.problem.checks import Array, check_span, covariance, finite_vector, frozen, lock, numeric
 from piazzi.problem.constants import with_station_constants
+from piazzi.problem.epochs import check_near, epoch_given
 from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
 from piazzi.problem.two_body import check_orbit_axes, check_two_body
 from piazzi.text import nearest, suggest
@@ -46,6 +47,8 @@ class Problem:
     name : str
     manoeuvres : sequence of Manoeuvre
         Sudden changes of the state, applied by every estimator and in simulation.
+    epoch : Epoch, or what one is made of, optional
+        The instant of time zero: all times are seconds of TT past it, and stay within 1e8 s.
 
     Raises
     ------
@@ -63,6 +66,7 @@ class Problem:
     truth: Truth | None = None
     name: str = ""
     manoeuvres: Sequence[Manoeuvre] = ()
+    epoch: Any = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -78,6 +82,9 @@ class Problem:
         put(self, "integrator", self._integrator())
         if self.prior_time is not None and not isfinite(self.prior_time):
             raise ValueError(f"prior_time is {self.prior_time}; it must be finite")
+        put(self, "epoch", epoch_given(self.epoch))
+        check_near(self.prior_time or 0.0, self.epoch, "prior_time")
+        check_near([m.time for m in self.manoeuvres], self.epoch, "the time of a manoeuvre,")
         put(self, "prior", self._prior())
         self._check_regular()
         self._lay_out()
@@ -347,6 +354,7 @@ class Problem:
                 f"the prior is at {start:g} s, after the first measurement at {times[0]:g} s: with_prior_at propagates it back"
             )
         check_span(start, times[0], "the first measurement")
+        check_near(times[[0, -1]], self.epoch, "time")
         if self.manoeuvres:
             manoeuvres.check_after(self.manoeuvres, start)
         dt = np.empty_like(times)

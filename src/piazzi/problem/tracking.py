@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.problem.checks import Array, backwards, check_span, frozen, lock, numeric
+from piazzi.problem.epochs import check_near, check_same, epoch_given, shifted
 
 if TYPE_CHECKING:
     from piazzi.problem.problem import Problem
@@ -20,15 +21,15 @@ class Tracking:
 
     Parameters
     ----------
-    row_times : (J,), seconds after `epoch`, not decreasing
+    row_times : (J,), seconds, not decreasing: of TT after `epoch` where there is one
     values : (J, m) or (J,)
         Up to the widest sensor's components; NaN where a value is missing.
     row_stations : (J,) names, optional
         Not needed where the problem has one station.
     truth : (K, n), optional
         True state at each epoch.
-    epoch : str
-        Calendar date of time zero, where there is one.
+    epoch : Epoch, or what one is made of, optional
+        The instant of time zero.  Where the problem has one too, they must be the same: see `with_epoch`.
 
     Attributes
     ----------
@@ -38,17 +39,19 @@ class Tracking:
     Raises
     ------
     ValueError
-        For no measurements, times that are not finite or decrease, infinite values, or wrong shapes.
+        For no measurements, times that are not finite or decrease, infinite values, wrong shapes, an epoch that is no date,
+        or times that are 1e8 s or more from it.
     """
 
     row_times: Any
     values: Any
     row_stations: Any = None
     truth: Any = None
-    epoch: str = ""
+    epoch: Any = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
+        put(self, "epoch", epoch_given(self.epoch))
         put(self, "row_times", self._checked_times())
         put(self, "values", self._checked_values())
         if self.row_stations is not None:
@@ -77,6 +80,7 @@ class Tracking:
         if down is not None:
             raise ValueError(f"times must increase: row {down} is at {times[down]:g} s, after {times[down - 1]:g} s")
         check_span(times[0], times[-1], f"row {len(times) - 1}")
+        check_near(times[[0, -1]], self.epoch, "time")
         return frozen(times)
 
     def _checked_values(self) -> Array:
@@ -124,8 +128,10 @@ class Tracking:
         Raises
         ------
         ValueError
-            For an unknown station (with the nearest name), or more values than its sensor has components.
+            For an unknown station (with the nearest name), more values than its sensor has components, or an epoch that is
+            not the problem's.
         """
+        check_same(problem, self)
         if not problem.stations:
             raise ValueError("the problem has no stations, so nothing can be measured")
         if self.row_stations is None:
@@ -138,6 +144,22 @@ class Tracking:
             index = np.array([problem.station_index(str(name)) for name in unique], dtype=np.int64)[inverse]
         self._check_widths(problem, index)
         return index
+
+    def with_epoch(self, epoch: Any) -> Tracking:
+        """The same measurements with times past another instant: each later by the exact difference, rounded once.
+
+        Raises
+        ------
+        ValueError
+            Where the tracking has no epoch, `epoch` is no date, or a time would be 1e8 s or more from it.
+        """
+        target = epoch_given(epoch)
+        if self.epoch is None or target is None:
+            raise ValueError("the tracking has no epoch to move from; replace(tracking, epoch=...) gives it one")
+        if target == self.epoch:
+            return self
+        times = shifted(self.row_times, self.epoch.since(target))
+        return Tracking(times, self.values, self.row_stations, self.truth, target)
 
     def with_factor(self, problem: Problem, station: str, times: Any = None) -> Tracking:
         """The same tracking with a factor of the user's own: rows in which `station` measures zero.

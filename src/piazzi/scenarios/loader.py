@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from piazzi.model import Model
 from piazzi.opening import opened
 from piazzi.problem import Problem, with_gauss_markov
 from piazzi.problem.checks import Array
+from piazzi.problem.epochs import epoch_given
 from piazzi.scenarios.equations import read_physics
 from piazzi.scenarios.motion import read_gauss_markov, read_integrator, read_manoeuvres
 from piazzi.scenarios.scenario import Picture, Scenario, read_plan, read_times
@@ -25,6 +26,9 @@ from piazzi.scenarios.values import read_noise, read_parameters, read_prior, rea
 from piazzi.text import nearest
 from piazzi.units import Units
 
+if TYPE_CHECKING:
+    from piazzi.earth import Epoch
+
 FILES = Path(__file__).parent / "files"
 TEMPLATE = "template"
 MAX_BYTES = 2**18
@@ -32,7 +36,7 @@ MAX_BYTES = 2**18
 _LONG_KEY = re.compile(rb"(?:[\w\"'-]{1,200}[ \t]{0,20}\.[ \t]{0,20}){30}")
 _PLACE = re.compile(r" \(at (line \d+, column \d+|end of document)\)$")
 SECTIONS = (
-    "title", "units", "states", "memory", "groups", "definitions", "dynamics", "step", "parameters", "sensors", "stations",
+    "title", "epoch", "units", "states", "memory", "groups", "definitions", "dynamics", "step", "parameters", "sensors", "stations",
     "prior", "process_noise", "gauss_markov", "integrator", "manoeuvres", "times", "truth", "picture", "study",
 )  # fmt: skip
 MAX_STEPS = 10**10
@@ -166,6 +170,7 @@ def read_scenario(data: Mapping[str, Any], name: str, faults: Faults) -> Scenari
 def read_problem(file: Table, name: str, units: Units, start: float | None = None) -> Problem | None:
     """The problem, or None after noting every fault; its prior is at `start` unless the file says otherwise."""
     before = len(file.faults)
+    epoch = _epoch(file)
     physics = read_physics(file, units)
     parameters = read_parameters(file.table("parameters"), physics, physics.model)
     integrator = read_integrator(file.table("integrator"), units)
@@ -183,9 +188,17 @@ def read_problem(file: Table, name: str, units: Units, start: float | None = Non
         return None
     with file.faults.at(""):
         places = [s for s in stations if s is not None]
-        problem = Problem(physics.model, prior, noise, places, parameters, integrator, prior_time, truth, name, manoeuvres)
+        given = (physics.model, prior, noise, places, parameters, integrator, prior_time, truth, name, manoeuvres)
+        problem = Problem(*given, epoch=epoch)
         with file.faults.at("gauss_markov"):
             return problem if gauss_markov is None else with_gauss_markov(problem, **gauss_markov)
+    return None
+
+
+def _epoch(file: Table) -> Epoch | None:
+    """The instant of time zero, where the file has one."""
+    with file.faults.at("epoch"):
+        return epoch_given(file.text("epoch"))
     return None
 
 

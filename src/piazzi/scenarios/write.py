@@ -16,7 +16,7 @@ from piazzi.units import Labels
 
 SECTIONS = (
     "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise",
-    "integrator", "manoeuvres", "truth",
+    "integrator", "manoeuvres", "truth", "epoch",
 )  # fmt: skip
 
 
@@ -38,6 +38,8 @@ def problem_to_tables(problem: Problem) -> dict[str, Any]:
         "integrator": write_integrator(problem.integrator),
         "manoeuvres": [write_manoeuvre(m) for m in problem.manoeuvres],
     }
+    if problem.epoch is not None:
+        tables["epoch"] = problem.epoch.exact()
     if problem.prior_time is not None:
         tables["prior"]["time"] = float(problem.prior_time)
     if problem.truth is not None:

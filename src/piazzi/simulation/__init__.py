@@ -56,7 +56,7 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
     v = rng.standard_normal((K * len(index), M))
     states, z = propagate(problem, actual, epochs, index, first, w, v if truth_half.measurement_noise else None)
     names = np.array([s.name for s in problem.stations])[np.tile(index, K)] if len(problem.stations) > 1 else None
-    return Tracking(np.repeat(epochs, len(index)), z, names, states)
+    return Tracking(np.repeat(epochs, len(index)), z, names, states, problem.epoch)
 
 
 def propagate(

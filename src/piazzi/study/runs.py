@@ -32,7 +32,7 @@ class Runs:
     def tracking(self, i: int) -> Tracking:
         stations = [s.name for s in self.world.stations]
         names = np.array(stations)[self.layout.station] if len(stations) > 1 else None
-        return Tracking(np.repeat(self.layout.times, len(stations)), self.z[i], names, self.truth[i])
+        return Tracking(np.repeat(self.layout.times, len(stations)), self.z[i], names, self.truth[i], self.world.epoch)
 
 
 @lru_cache(maxsize=4)
