@@ -69,9 +69,7 @@ def _with_prior_before(text: str, problem: Problem, tracking: Tracking) -> tuple
         raise ValueError(f"{text}: {error}") from None
 
 
-def _loaded(
-    text: str, seed: int, scenario: str | os.PathLike[str] | None, scale: str | None
-) -> tuple[Problem, Tracking]:
+def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, scale: str | None) -> tuple[Problem, Tracking]:
     kind = Path(text).suffix.lower()
     if scale is not None and kind != ".csv":
         raise ValueError(f"{text}: --scale is for the dates of a .csv file")

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
+from piazzi.cli import options
 from piazzi.earth.columns import read_dates
+from piazzi.earth.scales import SCALES
 from piazzi.io import cells, load_estimate, save, save_estimate
 from piazzi.io.checkpoint import fingerprint
 from piazzi.io.csv import read_csv
@@ -44,6 +46,10 @@ def read(folder, text, given=PROBLEM, scale=None):
 # ---- a column at once ---------------------------------------------------------------------------------------------------
 
 
+def test_the_command_line_knows_the_scales():
+    assert options.SCALES == SCALES
+
+
 def one_by_one(texts, scale=None):
     found = [pz.Epoch(t, scale) for t in texts]
     return np.array([e.whole for e in found]), np.array([e.fraction for e in found])
@@ -59,7 +65,9 @@ def dates(draw):
 
 
 @settings(max_examples=60)
-@given(st.lists(dates(), min_size=1, max_size=6), st.sampled_from(["UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1"]), st.booleans())
+@given(
+    st.lists(dates(), min_size=1, max_size=6), st.sampled_from(["UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1"]), st.booleans()
+)
 def test_a_column_of_dates_is_what_epoch_makes_of_each_in_all_bits(texts, scale, in_cells):
     cells = [f"{t} {scale}" for t in texts] if in_cells else texts
     found = read_dates(np.array(cells, dtype=bytes), None if in_cells else scale)
@@ -70,7 +78,13 @@ def test_a_column_of_dates_is_what_epoch_makes_of_each_in_all_bits(texts, scale,
 
 
 def test_dates_in_other_forms_stand_beside_one_another():
-    texts = ["2016-12-31T23:59:59Z", "2016-12-31T23:59:60 UTC", "2017-01-01T02:00:00.5+02:00", "2017-01-01[UTC]", "MJD 57754.5 UTC"]
+    texts = [
+        "2016-12-31T23:59:59Z",
+        "2016-12-31T23:59:60 UTC",
+        "2017-01-01T02:00:00.5+02:00",
+        "2017-01-01[UTC]",
+        "MJD 57754.5 UTC",
+    ]
     found = read_dates(np.array(texts, dtype=bytes))
     assert_allclose(found.whole - found.whole[0] + found.fraction - found.fraction[0], [0, 1, 2.5, 2, 43202], rtol=0, atol=1e-9)
 
@@ -141,11 +155,19 @@ def test_dates_become_seconds_past_the_epoch_of_the_problem_leap_seconds_counted
         ("time,z\n" + ROWS, None, r"line 2: date .* has no time scale: .*; or say it once: --scale UTC, or time\[UTC\]"),
         ("time[UTC],z\n" + ROWS, "GPS", "--scale GPS was said, but column 'time' is in UTC"),
         ("time,z\n0,1\n1,2\n", "GPS", "--scale GPS is for dates; the times of this file are seconds"),
-        ("time[UTC],z\n2017-01-01,1\n2016-12-31,1\n", None, "line 3: times must increase, but 2016-12-31 comes after 2017-01-01"),
+        (
+            "time[UTC],z\n2017-01-01,1\n2016-12-31,1\n",
+            None,
+            "line 3: times must increase, but 2016-12-31 comes after 2017-01-01",
+        ),
         ("time[UTC],z\n2017-01-01,1\n,1\n", None, "line 3: the time is missing; it must be a date"),
         ("time[UTC],z\n2017-01-01,1\n\n2017-01-01T00:00:0x,1\n", None, "line 4: date '2017-01-01T00:00:0x' cannot be read"),
         ("time[UTC],z\n2020-06-01,1\n", None, r"line 2: 2020-06-01, at 1\.07744e\+08 s is 3\.41 years from the epoch"),
-        ("time,z\n2017-01-01T00:00:00 UTC,1\n2017-01-01T00:00:20 GPS,1\n", None, "line 3: date .* is in GPS, those before in UTC"),
+        (
+            "time,z\n2017-01-01T00:00:00 UTC,1\n2017-01-01T00:00:20 GPS,1\n",
+            None,
+            "line 3: date .* is in GPS, those before in UTC",
+        ),
         ("time[XYZ],z\n2017-01-01,1\n", None, "XYZ"),
         ("time[UTC],z\n", None, "there are no measurements: only a header"),
         ("# epoch = 2017-01-01\ntime,z\n0,1\n", None, "date '2017-01-01' has no time scale"),
@@ -159,7 +181,9 @@ def test_a_table_with_a_fault_is_refused_in_one_line(tmp_path, text, scale, mess
 
 
 def test_without_an_epoch_dates_need_a_prior_at_the_first_of_them(tmp_path):
-    with pytest.raises(ValueError, match=r'problem has no epoch.*prior at 0 s: give it one, such as epoch = "2016-12-31T23:59:59 UTC"'):
+    with pytest.raises(
+        ValueError, match=r'problem has no epoch.*prior at 0 s: give it one, such as epoch = "2016-12-31T23:59:59 UTC"'
+    ):
         read(tmp_path, "time[UTC],z\n" + ROWS, problem(None))
     tracking = read(tmp_path, "time[UTC],z\n" + ROWS, problem(None, None))
     assert tracking.epoch == pz.Epoch("2016-12-31T23:59:59 UTC")
@@ -182,7 +206,7 @@ def test_a_stream_reads_dates_line_by_line():
     assert said_once.read(b"2017-01-01T00:00:17,2\n", 2).time == 3600.0
     by_option = RowReader.begin(PROBLEM, b"time,z", 1, (), "GPS")
     assert by_option.read(b"2017-01-01T00:00:17,2\n", 2).time == 3600.0
-    with pytest.raises(ValueError, match="line 2: date .* has no time scale"):
+    with pytest.raises(ValueError, match=r"line 2: date .* has no time scale"):
         reader.read(b"2016-12-31T23:59:59,2\n", 2)
     with pytest.raises(ValueError, match="line 1: there are dates, but the problem has no epoch"):
         RowReader.begin(problem(None), b"time[GPS],z", 1)
@@ -242,7 +266,7 @@ def test_the_founding_layout_keeps_the_epoch(tmp_path):
         arrays = dict(found)
     for bad in ([1.0], [np.nan, 0.0], [1e300, 0.0], [0.0, 1.0]):
         np.savez(tmp_path / "b.npz", **arrays | {"epoch_tt": np.array(bad)})
-        with pytest.raises(ValueError, match="epoch_tt"):
+        with pytest.raises(ValueError, match=r"epoch_tt"):
             read_npz(tmp_path / "b.npz")
 
 
@@ -292,8 +316,16 @@ def test_a_scenario_says_its_epoch(tmp_path):
         ("2016-12-31T23:00:00", "", "epoch: date '2016-12-31T23:00:00' has no time scale: add one of UTC"),
         ("1959-01-01 UTC", "", "epoch: date .*: there is no UTC before 1960; give it in UT1 or TT"),
         ("2016-02-13T23:59:60 UTC", "", "epoch: date .*: that day did not end with a leap second"),
-        ("2016-02-13 UTC", "[[manoeuvres]]\ntime = 2e8\ndelta_v = [1]\nstates = ['v']", r"the time of a manoeuvre, 2e\+08 s is 6\.34 years from the epoch"),
-        ("2016-02-13 UTC", "start = 1e8", r"1e\+08 s is 3\.17 years from the epoch, 2016-02-13T00:00:00 UTC; times stay within"),
+        (
+            "2016-02-13 UTC",
+            "[[manoeuvres]]\ntime = 2e8\ndelta_v = [1]\nstates = ['v']",
+            r"the time of a manoeuvre, 2e\+08 s is 6\.34 years from the epoch",
+        ),
+        (
+            "2016-02-13 UTC",
+            "start = 1e8",
+            r"1e\+08 s is 3\.17 years from the epoch, 2016-02-13T00:00:00 UTC; times stay within",
+        ),
     ],
 )
 def test_a_scenario_with_a_bad_epoch_is_refused(tmp_path, epoch, more, message):

@@ -62,7 +62,9 @@ def test_a_leap_second_counts():
 def test_epochs_that_differ_are_told_before_anything_is_estimated():
     problem = dated(UTC)
     tracking = pz.Tracking([0.0, 1.0], [1, 2], epoch="2016-02-13T16:00:01 UTC")
-    with pytest.raises(ValueError, match=r"times of the tracking are past 2016.*tracking.with_epoch\(problem.epoch\) moves them"):
+    with pytest.raises(
+        ValueError, match=r"times of the tracking are past 2016.*tracking.with_epoch\(problem.epoch\) moves them"
+    ):
         pz.ExtendedKalmanFilter().estimate(problem, tracking)
     estimate = pz.ExtendedKalmanFilter().estimate(problem, tracking.with_epoch(problem.epoch))
     assert_array_equal(estimate.times, [1.0, 2.0])
@@ -81,6 +83,8 @@ def test_times_far_from_their_epoch_ask_for_a_nearer_one():
     assert pz.Tracking([0.0, 9.9e7], [1, 2], epoch=UTC).epoch == pz.Epoch(UTC)
 
 
-@pytest.mark.parametrize("epoch", [pz.Epoch(UTC), pz.Epoch.at(1.5e8, 0.1), pz.Epoch.at(-3e9, 1e-17), pz.Epoch("2016-01-01 TDB")])
+@pytest.mark.parametrize(
+    "epoch", [pz.Epoch(UTC), pz.Epoch.at(1.5e8, 0.1), pz.Epoch.at(-3e9, 1e-17), pz.Epoch("2016-01-01 TDB")]
+)
 def test_exact_text_comes_back_in_all_bits(epoch):
     assert pz.Epoch(epoch.exact()) == epoch

@@ -90,6 +90,7 @@ def command(
 
 def to_dict(problem: Problem, tracking: Tracking, name: str, seed: int, output_file: str | None) -> dict[str, Any]:
     """What was simulated, in numbers; the tracking itself is in the file."""
+    from piazzi.problem.epochs import dated
     from piazzi.simulation import true_problem
 
     assert tracking.truth is not None
@@ -100,6 +101,7 @@ def to_dict(problem: Problem, tracking: Tracking, name: str, seed: int, output_f
         "epochs": len(tracking.times),
         "measurements": len(tracking.row_times),
         "prior_time": problem.prior_start(tracking.times),
+        **dated(problem, tracking),
         "integrator": steps(true_problem(problem).integrator),
         "states": list(problem.model.names),
         "units": {n: problem.model.unit(n) for n in problem.model.names},

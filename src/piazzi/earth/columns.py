@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piazzi.earth import scales
-from piazzi.earth.dates import read_date
+from piazzi.earth.dates import Reading, read_date
 from piazzi.earth.epoch import orientation
 
 Array = np.ndarray[Any, Any]
@@ -62,14 +62,13 @@ def read_dates(texts: Array, scale: str | None = None, place: Callable[[int], st
     other = np.flatnonzero(kinds != kinds[0])
     if other.size:
         i = int(other[0])
-        raise ValueError(
-            f"{place(i)}date {_text(texts[i])!r} is in {known[kinds[i]]}, those before in {known[kinds[0]]}; one file has one scale"
-        )
+        here, before = known[kinds[i]], known[kinds[0]]
+        raise ValueError(f"{place(i)}date {_text(texts[i])!r} is in {here}, those before in {before}; one file has one scale")
     kind = known[int(kinds[0])]
     return Instants(kind, *scales.to_tt(kind, day, seconds, fraction, orientation(kind)))
 
 
-def _one(text: str, scale: str | None, place: str) -> Any:
+def _one(text: str, scale: str | None, place: str) -> Reading:
     try:
         reading = read_date(text, scale)
         if scale is not None and reading.scale != scale.upper():

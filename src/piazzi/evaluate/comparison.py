@@ -19,6 +19,7 @@ from piazzi.evaluate.consistency_tests import LONGEST
 from piazzi.evaluate.grids import as_text
 from piazzi.evaluate.rows import Row, evaluate, numbers
 from piazzi.problem import Problem, Tracking
+from piazzi.problem.epochs import dated
 from piazzi.problem.inputs import prepare
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ class Comparison:
             "source": self.source,
             "epochs": len(self.tracking.times),
             "prior_time": self.problem.prior_start(self.tracking.times),
+            **dated(self.problem, self.tracking),
             "states": list(self.problem.model.names),
             "rows": [row.to_dict() for row in self.rows],
         }

@@ -17,6 +17,7 @@ from piazzi.evaluate.twins import Twin
 from piazzi.evaluate.verdict import AS_THE_PRIOR, conclusion, local, twins_found, unreliable, weakest
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.epochs import dated
 from piazzi.text import printable
 
 if TYPE_CHECKING:
@@ -113,6 +114,7 @@ class Observability:
             "states": list(model.names),
             "epochs": len(self.tracking.times),
             "prior_time": self.problem.prior_start(self.tracking.times),
+            **dated(self.problem, self.tracking),
             **self.information.to_dict(),
             "weakest_direction": self.weakest_direction,
             "twins": [twin.to_dict() for twin in self.twins],

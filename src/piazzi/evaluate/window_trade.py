@@ -15,6 +15,7 @@ from piazzi.evaluate.quantities import duration, ends, finite, ideal, number
 from piazzi.evaluate.rows import Row, numbers
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.epochs import dated
 
 if TYPE_CHECKING:
     import xarray
@@ -121,6 +122,7 @@ class WindowTrade:
             "source": self.source,
             "epochs": len(self.tracking.times),
             "prior_time": self.problem.prior_start(self.tracking.times),
+            **dated(self.problem, self.tracking),
             "states": list(self.problem.model.names),
             "iterations": self.iterations,
             "lags": self.lags.tolist(),

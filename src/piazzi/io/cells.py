@@ -221,11 +221,10 @@ def parse_rows(body: bytes, line: int, header: list[str], comments: tuple[str, .
     except csv.Error as error:
         raise ValueError(f"line {line + reader.line_num - 1}: {error}") from None
     texts = texts or dated(header, ())
-    given = {name: column for name, column in columns.items() if header.index(name) != texts.column}
-    numbers = {name: np.array(column, dtype=float) for name, column in given.items()}
+    numbers = {name: np.array(column, dtype=float) for name, column in columns.items() if header.index(name) != texts.column}
     index = np.array(station, dtype=np.int64) if STATION in header else None
-    text = as_bytes(np.array(dates, dtype=object)) if texts.column >= 0 else None
-    return Cells(comments, numbers, index, tuple(stations), lines, text, texts.scale)
+    given = as_bytes(np.array(dates, dtype=object)) if texts.column >= 0 else None
+    return Cells(comments, numbers, index, tuple(stations), lines, given, texts.scale)
 
 
 class Dated(NamedTuple):

@@ -39,7 +39,8 @@ def read_csv(path: str | os.PathLike[str], problem: Problem, scale: str | None =
     column names, as in ``bearing [deg]``, which must be of the column's kind.
 
     Times are seconds, or dates with their scale: in each cell, as the unit of the column, ``time[UTC]``, or as `scale`.  See
-    `times_of` for what they are counted from.  Where file and problem each have an epoch, times become those past the problem's.
+    `times_of` for what they are counted from.  Where file and problem each have an epoch, times become those past the
+    problem's.
 
     Raises
     ------

@@ -31,9 +31,10 @@ MAX_SUBSTEPS = 10**10
 def read_npz(path: str | os.PathLike[str]) -> tuple[Problem, Tracking]:
     """Problem and tracking of a file in the founding layout.
 
-    Keys: R (variance, rad^2), Q (4, 4) per second, dt (s), meas (K,) bearings (rad), x0 (4,), P0 (4, 4), and truth (K, 4),
-    and epoch_tt (2,), seconds of TT past J2000.0 of time zero; the last two may be missing.  The problem is satellite-bearing with these numbers: ceil(dt) Taylor substeps, Q dt per step,
-    epochs at k dt, and a measurement at every one of them.
+    Keys: R (variance, rad^2), Q (4, 4) per second, dt (s), meas (K,) bearings (rad), x0 (4,), P0 (4, 4), and two that may be
+    missing: truth (K, 4), and epoch_tt (2,), the instant of time zero as whole seconds of TT past J2000.0 and a fraction.
+    The problem is satellite-bearing with these numbers: ceil(dt) Taylor substeps, Q dt per step, epochs at k dt, and a
+    measurement at every one of them.
 
     Raises
     ------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,9 +12,12 @@ from piazzi.estimate.forecast import Forecast
 from piazzi.evaluate.grids import rich_table
 from piazzi.evaluate.metrics import errors, residual_rms
 from piazzi.evaluate.quantities import display_of, duration, number, with_sigma
-from piazzi.problem import Problem, Tracking
+from piazzi.problem import Problem, Tracking, epoch_of
 from piazzi.problem.checks import Array
 from piazzi.text import printable
+
+if TYPE_CHECKING:
+    from piazzi.earth import Epoch
 
 
 def heading(problem: Problem, tracking: Tracking, source: str, remark: str = "") -> Any:
@@ -28,6 +31,7 @@ def summary(problem: Problem, tracking: Tracking, source: str) -> str:
     """One line on what there is: source, epochs, how long, who measured, whether the truth is known, where the prior stands."""
     times, count = tracking.times, len(problem.stations)
     span = f" over {duration(float(times[-1] - times[0]))}" if len(times) > 1 else ""
+    span += _date(epoch_of(problem, tracking), float(times[0]), " from {}")
     stations = problem.stations[0].name if count == 1 else f"{count} stations"
     missing = int(np.isnan(tracking.values).all(axis=1).sum())
     parts = [
@@ -47,6 +51,11 @@ def prior_place(problem: Problem, times: Array) -> str:
     return f"prior at {start:.12g} s" + (f", {duration(before)} before the first epoch" if before > 0 else "")
 
 
+def _date(epoch: Epoch | None, t: float, text: str = " ({})") -> str:
+    """The date of a time within a text, "" where there is none."""
+    return "" if epoch is None else text.format(epoch + t)
+
+
 def _count(many: int, what: str) -> str:
     return f"{many:,} {what}{'' if many == 1 else 's'}"
 
@@ -58,7 +67,8 @@ def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
 
     error = errors(estimate)
     view = "with later measurements too" if estimate.view == "delayed" else "from measurements up to then"
-    title = f"State at t = {estimate.times[k]:g} s, {name}, {view}"
+    date = _date(estimate.epoch, float(estimate.times[k]))
+    title = f"State at t = {estimate.times[k]:g} s{date}, {name}, {view}"
     heads = ("state", "estimate", "sigma", *(["error"] if error is not None else []), "unit")
     rows = []
     sigmas = np.sqrt(np.maximum(np.diagonal(estimate.covariance[k]), 0.0))

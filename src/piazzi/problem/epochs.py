@@ -59,6 +59,12 @@ def epoch_of(problem: Timed, tracking: Timed) -> Epoch | None:
     return found
 
 
+def dated(problem: Timed, tracking: Timed) -> dict[str, str]:
+    """The epoch as an entry of an object, none where there is none."""
+    epoch = epoch_of(problem, tracking)
+    return {} if epoch is None else {"epoch": epoch.exact()}
+
+
 def shifted(times: Array, seconds: tuple[float, float]) -> Array:
     """Times later by whole seconds and a fraction, rounded once."""
     whole = np.floor(times)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.problem.epochs import epoch_given
 from piazzi.study.score import NUMBERS
+
+if TYPE_CHECKING:
+    from piazzi.earth import Epoch
 
 KINDS = ("<f8", "<f4", "<i8", "|u1", "<u2", "<u4", "<u8", "|b1")
 VIEWS = ("realtime", "delayed")
@@ -31,6 +35,13 @@ def check_record(header: Any, size: int) -> None:
     messages = header.get("messages")
     if not (isinstance(messages, list) and all(_message(m, *task) for m in messages)):
         raise ValueError("a record has messages that are no row, run and text")
+
+
+def epoch_said(specification: Mapping[str, Any]) -> Epoch | None:
+    """The epoch of a study's problem, None where it has none; raises ValueError for what is no date."""
+    problem = specification.get("problem")
+    text = problem.get("epoch") if isinstance(problem, Mapping) else None
+    return epoch_given(text if isinstance(text, str) else None)
 
 
 def check_about(about: Mapping[str, Any]) -> None:
@@ -56,6 +67,7 @@ def check_about(about: Mapping[str, Any]) -> None:
     for name, fits in sound.items():
         if not fits:
             raise ValueError(f"what it says of its {name} is not what a study has")
+    epoch_said(about["specification"])
     if len(about["units"]) != len(about["groups"]):
         raise ValueError(f"it has units for {len(about['units'])} groups of {len(about['groups'])}")
     for point, row, *_ in about["messages"]:

@@ -7,16 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from piazzi.io import hdf5
 from piazzi.problem.checks import Array
 from piazzi.study.plan import SCHEMA
-from piazzi.study.schema import check_about, check_arrays
+from piazzi.study.schema import check_about, check_arrays, epoch_said
 from piazzi.study.score import NUMBERS
 from piazzi.study.summary import QUANTILES, Line, Row, line_of
+
+if TYPE_CHECKING:
+    from piazzi.earth import Epoch
 
 _NOT_COMPARED = ("seconds",)
 MOST_SHOWN = 20  # messages of failed runs
@@ -36,6 +39,11 @@ class Stored:
     path: Path
     about: Mapping[str, Any]
     times: Array
+
+    @property
+    def epoch(self) -> Epoch | None:
+        """The instant that times are past, where the problem has one."""
+        return epoch_said(self.about["specification"])
 
     @property
     def rows(self) -> list[tuple[str, str]]:
@@ -112,6 +120,7 @@ class Summary:
             "axes": specification["vary"],
             "digest": about["digest"],
             "quantiles": list(QUANTILES),
+            **({} if self.stored.epoch is None else {"epoch": self.stored.epoch.exact()}),
             "times": self.stored.times.tolist(),
             "rows": [line.to_dict() for line in self.lines],
             "messages": [

@@ -23,10 +23,13 @@ from piazzi.present.figures.style import (
     time_axis,
 )
 from piazzi.present.squares import Squares, nees_of, nis_of
+from piazzi.problem import epoch_of
 from piazzi.problem.checks import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from piazzi.earth import Epoch
 
 
 SIGMAS = 3.0
@@ -45,7 +48,7 @@ def state_error(ax: Axes, estimate: Estimate, state: str, *, name: str = "estima
     """
     band, error = error_and_band(estimate, state)
     show = show or state_display([estimate], state)
-    time = time_axis(ax, estimate.times)
+    time = time_axis(ax, estimate.times, estimate.epoch)
     part = drawn(len(band))
     t, half = estimate.times[part] * time.factor, band[part] * show.factor
     colour = shade_of(name)
@@ -105,12 +108,16 @@ def claim_overlay(ax: Axes, comparison: Comparison, group: str) -> Axes:
     return _overlay(ax, comparison, group, [claimed for _, claimed in _lengths(comparison, group)], "error expected")
 
 
+def _epoch(comparison: Comparison) -> Epoch | None:
+    return epoch_of(comparison.problem, comparison.tracking)
+
+
 def _overlay(ax: Axes, comparison: Comparison, group: str, lengths: Sequence[Array | None], what: str) -> Axes:
     views, times, model = comparison.views, comparison.tracking.times, comparison.problem.model
     both = [v for pair in _lengths(comparison, group) for v in pair if v is not None and np.isfinite(v).any()]
     unit = unit_of(model.unit(s) for s in dict(model.groups).get(group, (group,)))
     show = display_of(unit, [float(np.nanmedian(v)) for v in both])
-    time, part, names = time_axis(ax, times), drawn(len(times)), tuple(name for name, _ in views)
+    time, part, names = time_axis(ax, times, _epoch(comparison)), drawn(len(times)), tuple(name for name, _ in views)
     for n, ((name, view), length) in enumerate(zip(views, lengths, strict=True)):
         if length is not None:
             style = line_of(name, view, names) | {"lw": 2.2 - 1.2 * n / len(views)}  # where two coincide, both are seen
@@ -155,7 +162,7 @@ def nis_track(ax: Axes, comparison: Comparison) -> Axes:
 
 
 def _track(ax: Axes, comparison: Comparison, found: Squares) -> Axes:
-    time = time_axis(ax, comparison.tracking.times)
+    time = time_axis(ax, comparison.tracking.times, _epoch(comparison))
     ax.axhspan(found.low, found.high, color=MEASURED, alpha=0.13, lw=0, label=RANGE)
     ax.axhline(found.expected, color=MEASURED, lw=0.9, ls=(0, (5, 3)), label="ideal mean")
     part, names = drawn(len(found.times)), tuple(name for name, _ in comparison.views)

@@ -9,7 +9,7 @@ import numpy as np
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.quantities import Display, display_of, unit_of
 from piazzi.present.figures.style import MEASURED, STATIONS, drawn, plain, shade_of, time_axis
-from piazzi.problem import Problem, Tracking
+from piazzi.problem import Problem, Tracking, epoch_of
 from piazzi.problem.checks import Array
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def measurements(ax: Axes, problem: Problem, tracking: Tracking, column: int = 0
     name, unit = component_of(problem, column)
     values = tracking.values[:, column]
     show = display_of(unit, [float(np.nanmax(np.abs(values), initial=0.0))])
-    time = time_axis(ax, tracking.times)
+    time = time_axis(ax, tracking.times, epoch_of(problem, tracking))
     index = tracking.stations_of(problem)
     for s, station in enumerate(problem.stations):
         rows = np.flatnonzero((index == s) & ~np.isnan(values))
@@ -61,7 +61,7 @@ def innovations(ax: Axes, estimate: Estimate, column: int = 0, *, name: str = "e
     rows = rows[drawn(len(rows))]
     band = SIGMAS * np.sqrt(np.maximum(S[rows], 0.0))
     show = display_of(unit, [float(np.median(band)) if len(rows) else 0.0])
-    time = time_axis(ax, estimate.times)
+    time = time_axis(ax, estimate.times, estimate.epoch)
     t = estimate.tracking.row_times[rows] * time.factor
     station = estimate.tracking.stations_of(estimate.problem)[rows]
     for n, s in enumerate(np.unique(station)):  # each has a band of its own
@@ -98,7 +98,7 @@ def residuals(ax: Axes, estimate: Estimate, column: int = 0, *, name: str = "est
     rows = rows[drawn(len(rows))]
     band = SIGMAS * sigma[rows, column]
     show = display_of(unit, [float(np.median(band)) if len(rows) else 0.0])
-    time = time_axis(ax, estimate.times)
+    time = time_axis(ax, estimate.times, estimate.epoch)
     t = estimate.tracking.row_times[rows] * time.factor
     colour = shade_of(name)
     ax.fill_between(t, -band * show.factor, band * show.factor, color=colour, alpha=0.15, lw=0, label="3 sigma of the noise")

@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi.evaluate.observable import Observability
 from piazzi.present.figures.style import MEASURED, STATIONS, plain, plain_ticks, time_axis
+from piazzi.problem import epoch_of
 from piazzi.problem.checks import Array
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def bound_sigmas(ax: Axes, found: Observability) -> Axes:
 
 
 def _growing(ax: Axes, found: Observability, values: Array, labels: Sequence[str]) -> None:
-    time = time_axis(ax, found.growth_times)
+    time = time_axis(ax, found.growth_times, epoch_of(found.problem, found.tracking))
     shown = np.where(np.isfinite(values) & (values > 0), values, np.nan)
     for i, label in enumerate(labels):
         ax.plot(found.growth_times * time.factor, shown[:, i], color=STATIONS[i % len(STATIONS)], label=label)

@@ -51,7 +51,7 @@ def error_page(summary: Summary, lines: list[Line]) -> Figure:
     names = tuple(line.estimator for line in lines)
     for i, group in enumerate(stored.groups):
         ax, show = figure.add_subplot(len(stored.groups), 1, i + 1), group_display(stored, group)
-        unit = time_axis(ax, stored.times)
+        unit = time_axis(ax, stored.times, stored.epoch)
         for line in lines:
             style = line_of(line.estimator, line.view, names)
             rms, (low, _, high) = line.history.rms[:, i], line.history.quantiles[:, :, i] * show.factor
@@ -77,7 +77,7 @@ def nees_page(summary: Summary, lines: list[Line]) -> Figure:
     stored = summary.stored
     figure = _figure(8.0, 3.6)
     ax, names = figure.add_subplot(), tuple(line.estimator for line in lines)
-    unit = time_axis(ax, stored.times)
+    unit = time_axis(ax, stored.times, stored.epoch)
     for line in lines:
         style = line_of(line.estimator, line.view, names)
         ax.plot(stored.times * unit.factor, line.history.nees, label=label_of(line.estimator, line.view), **style)

@@ -16,6 +16,8 @@ from piazzi.text import printable
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from piazzi.earth import Epoch
+
 __all__ = ["COLOURS", "MEASURED", "PLANET", "STATIONS", "TRUTH", "colour_of", "label_of", "line_of", "plain", "shade_of"]
 MOST_POINTS = 4000
 RC: Any = {
@@ -61,10 +63,16 @@ def drawn(count: int) -> slice:
     return slice(None, None, max(1, -(-count // MOST_POINTS)))
 
 
-def time_axis(ax: Axes, times: Array) -> Display:
-    """Label and limit the axis of time; returns its unit."""
+def time_label(epoch: Epoch | None) -> str:
+    """What the axis of time is called."""
+    return "time" if epoch is None else f"time past {epoch.to('TT', digits=3)}"
+
+
+def time_axis(ax: Axes, times: Array, epoch: Epoch | None = None) -> Display:
+    """Label and limit the axis of time, which is past an instant where there is one; returns its unit."""
     show = time_display(times)
-    ax.set_xlabel(show.label("time"))
+    words = {"h": "hours", "min": "minutes", "s": "seconds"}[show.unit or "s"]
+    ax.set_xlabel(show.label("time") if epoch is None else time_label(epoch).replace("time", words))
     if len(times) > 1:
         margin = 0.01 * (times[-1] - times[0])
         ax.set_xlim((times[0] - margin) * show.factor, (times[-1] + margin) * show.factor)

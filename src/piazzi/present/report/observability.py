@@ -7,10 +7,11 @@ import numpy as np
 from piazzi.evaluate.observable import Observability
 from piazzi.evaluate.quantities import Display
 from piazzi.present.colours import STATIONS
-from piazzi.present.figures.style import time_display
+from piazzi.present.figures.style import time_display, time_label
 from piazzi.present.report.blocks import Axis, Chart, Line, Point, Section, Tab, Text, Tone
 from piazzi.present.report.windows import table_of
 from piazzi.present.tables import summary
+from piazzi.problem import epoch_of
 
 _INTRO = (
     "What the measurements alone, without the prior, say about the first state, as they come in: a singular value s determines"
@@ -66,7 +67,7 @@ def _singular_values(found: Observability) -> Chart:
         values = np.where(values > 0, values, np.nan)
         lines.append(Line(found.growth_times, values, label, colour=STATIONS[i % len(STATIONS)]))
     y = Axis("singular value [1/prior sigma]", Display(""), "log", *_limits(lines, 1.0))
-    x = Axis("time", time_display(found.growth_times))
+    x = _time(found)
     return Chart("Information about the first state", x, y, lines, levels=[(1.0, "as much as the prior")])
 
 
@@ -77,8 +78,12 @@ def _sigmas(found: Observability) -> Chart:
         sigma = np.where(np.isfinite(sigma) & (sigma > 0), sigma, np.nan)
         lines.append(Line(found.growth_times, sigma, state, colour=STATIONS[i % len(STATIONS)]))
     y = Axis("Cramer-Rao sigma [prior sigma]", Display(""), "log", *_limits(lines, 1.0))
-    x = Axis("time", time_display(found.growth_times))
+    x = _time(found)
     return Chart("How well each state can be known", x, y, lines, levels=[(1.0, "as well as the prior")])
+
+
+def _time(found: Observability) -> Axis:
+    return Axis(time_label(epoch_of(found.problem, found.tracking)), time_display(found.growth_times))
 
 
 def _limits(lines: list[Line], mark: float) -> tuple[float, float]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.evaluate.quantities import Display, number
 from piazzi.present.colours import dash_of, label_of, shades
-from piazzi.present.figures.style import time_display
+from piazzi.present.figures.style import time_display, time_label
 from piazzi.present.report.blocks import Axis, Chart, Key, Line, Point, Section, Tab, Table, Text
 from piazzi.present.study_table import columns, failures, group_display, heading, ideal_nees, point_name, widest_bounds
 from piazzi.problem.checks import Array
@@ -44,7 +44,7 @@ def _tab(summary: Summary, index: int, title: str) -> Tab:
         for line in lines
     ]
     show = time_display(stored.times)
-    axis = Axis("time", show, low=float(stored.times[0]), high=float(stored.times[-1]))
+    axis = Axis(time_label(stored.epoch), show, low=float(stored.times[0]), high=float(stored.times[-1]))
     charts = [chart for i, group in enumerate(stored.groups) for chart in _errors(summary, lines, keys, axis, i, group)]
     return Tab(
         f"{name}: {where}" if where else name,
