@@ -63,7 +63,9 @@ WEIGHT: tuple[float, ...]
 
 
 # functions of the language, as far as fragments use them
+atan2: Any
 fabs: Any
+log: Any
 sin: Any
 sinh: Any
 sqrt: Any
@@ -135,6 +137,8 @@ ones: Any
 store_errors: Any
 squared_lanes: Any
 nees_lanes: Any
+# written in fragments/kepler.py
+kepler_motion: Any
 # written in fragments/border.py
 rotate: Any
 invert_upper: Any
