@@ -1,9 +1,11 @@
 """The Earth: time scales, its orientation, frames, stations, Sun, Moon and planets."""
 
+from piazzi.earth import media
 from piazzi.earth.bodies import BODIES, body
 from piazzi.earth.eop import EOP, EOPTable, EOPWarning, read_eop
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import GravityField, gravity_field, read_gravity
+from piazzi.earth.formula import Formula
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
 from piazzi.earth.ilrs import ilrs_stations
 from piazzi.earth.rotation import FRAMES, rotation, rotation_rate, transform
@@ -18,10 +20,11 @@ from piazzi.earth.stations import (
     up_north_east,
 )
 from piazzi.earth.tides import pole_tide, solid_tide, station_displacement
+from piazzi.earth.weather import Weather
 
 __all__ = [
-    "BODIES", "EOP", "FRAMES", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch", "GravityField", "Station",
-    "StationList", "StationWarning", "azimuth_elevation_range", "body", "geodetic_to_position", "gravity_field",
-    "ilrs_stations", "pole_tide", "position_to_geodetic", "read_eop", "read_gravity", "read_stations", "rotation",
-    "rotation_rate", "solid_tide", "station_displacement", "transform", "up_north_east",
+    "BODIES", "EOP", "FRAMES", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch", "Formula", "GravityField",
+    "Station", "StationList", "StationWarning", "Weather", "azimuth_elevation_range", "body", "geodetic_to_position",
+    "gravity_field", "ilrs_stations", "media", "pole_tide", "position_to_geodetic", "read_eop", "read_gravity",
+    "read_stations", "rotation", "rotation_rate", "solid_tide", "station_displacement", "transform", "up_north_east",
 ]  # fmt: skip
