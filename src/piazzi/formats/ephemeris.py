@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from piazzi.earth import Epoch
 
 Array = np.ndarray[Any, Any]
+
+
+class Burn(NamedTuple):
+    """A manoeuvre: ignition, seconds, change of mass in kg (NaN where not said), axes, and m/s along them."""
+
+    epoch: Epoch
+    duration: float
+    mass: float
+    frame: str
+    delta_v: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -31,6 +41,9 @@ class Arc:
     lines : (K,) where each state stands in the file
     interpolation, degree : as the file recommends
     useable : first and last instant to interpolate between
+    spacecraft : ``mass`` (kg), ``drag_area``, ``radiation_area`` (m^2), ``drag_coefficient``, ``radiation_coefficient``
+    elements : osculating elements and ``gm`` beside the state, in SI, as a file may repeat it
+    burns : manoeuvres
     said : every other keyword with its text
     """
 
@@ -56,6 +69,9 @@ class Arc:
     interpolation: str | None = None
     degree: int | None = None
     useable: tuple[Epoch | None, Epoch | None] = (None, None)
+    spacecraft: tuple[tuple[str, float], ...] = ()
+    elements: tuple[tuple[str, float], ...] = ()
+    burns: tuple[Burn, ...] = ()
     said: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
@@ -82,6 +98,36 @@ class Arc:
         return self.epoch + float(self.t[k])
 
 
+@dataclass(frozen=True, kw_only=True)
+class MeanElements:
+    """Elements of an orbit theory, which only that theory makes positions of.
+
+    Attributes
+    ----------
+    epoch, theory : instant, and the theory (``SGP4``)
+    elements : ``mean_motion`` (rad/s) or ``semi_major_axis`` (m), ``eccentricity``, ``inclination``, ``ascending_node``,
+        ``argument_of_pericentre``, ``mean_anomaly`` (rad), ``gm``
+    name, identifier, centre, frame, scale : as of `Arc`
+    covariance, covariance_frame : (36,) of the 6 by 6 matrix of position and velocity in SI, row by row; empty where there
+        is none
+    spacecraft : as of `Arc`
+    said : every keyword with its text, the parameters of two-line elements among them
+    """
+
+    epoch: Epoch
+    theory: str
+    elements: tuple[tuple[str, float], ...]
+    name: str = ""
+    identifier: str = ""
+    centre: str | None = None
+    frame: str | None = None
+    scale: str | None = None
+    covariance: tuple[float, ...] = ()
+    covariance_frame: str | None = None
+    spacecraft: tuple[tuple[str, float], ...] = ()
+    said: tuple[tuple[str, str], ...] = ()
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ephemeris:
     """Arcs of one object or many, in the order of their file.
@@ -89,6 +135,7 @@ class Ephemeris:
     Attributes
     ----------
     arcs : of one object, or of many
+    mean : mean elements, of files that hold those
     file, format : where it came from
     said : every keyword of the header with its text
     assumed, open : what was assumed; what is not said, each with the option that would say it
@@ -96,6 +143,7 @@ class Ephemeris:
     """
 
     arcs: tuple[Arc, ...]
+    mean: tuple[MeanElements, ...] = ()
     file: str = ""
     format: str = ""
     said: tuple[tuple[str, str], ...] = ()
@@ -106,7 +154,7 @@ class Ephemeris:
     @property
     def objects(self) -> tuple[str, ...]:
         """Names, each once."""
-        return tuple(dict.fromkeys(arc.name for arc in self.arcs))
+        return tuple(dict.fromkeys([arc.name for arc in self.arcs] + [elements.name for elements in self.mean]))
 
     def of(self, name: str) -> tuple[Arc, ...]:
         """Arcs of an object, by its name or identifier."""

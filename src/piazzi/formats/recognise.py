@@ -48,6 +48,10 @@ FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "CRD": Format(_begins(_REMARKS + rb"[Hh]1\s"), tracking="crd:read"),
     "TDM": Format(_begins(rb"CCSDS_TDM_VERS\s*="), tracking="tdm:read_kvn"),
     "TDM XML": Format(_root(rb"tdm"), tracking="tdm:read_xml"),
+    "OEM": Format(_begins(rb"CCSDS_OEM_VERS\s*="), ephemeris="oem:read_kvn"),
+    "OPM": Format(_begins(rb"CCSDS_OPM_VERS\s*="), ephemeris="opm:read_opm"),
+    "OMM": Format(_begins(rb"CCSDS_OMM_VERS\s*="), ephemeris="opm:read_omm"),
+    "OEM XML": Format(_root(rb"(?:oem|opm|omm|ndm)"), ephemeris="odm_xml:read"),
 }
 
 
@@ -59,6 +63,8 @@ def recognise(data: bytes) -> str | None:
 
 def read_tracking(*paths: str | os.PathLike[str], **conventions: Any) -> Observations:
     """Measurements of files of tracking data, recognised by what is in them; ``.gz`` and ``.Z`` are taken as they are.
+
+    States of ephemerides are fixes: rows ``x``, ``y``, ``z``, and ``vx``, ``vy``, ``vz`` where there are velocities.
 
     Parameters
     ----------
@@ -82,7 +88,9 @@ def read_tracking(*paths: str | os.PathLike[str], **conventions: Any) -> Observa
 def _tracking(path: str | os.PathLike[str], told: Conventions) -> Observations:
     data, form, name = _opened(path)
     if form.tracking is None:
-        raise ValueError(f"{name}: the file holds orbits, not measurements; read_ephemeris reads it")
+        from piazzi.formats.fixes import fixes_of
+
+        return fixes_of(_reader(str(form.ephemeris))(data, name, told))
     found: Observations = _reader(form.tracking)(data, name, told)
     return found
 
@@ -99,7 +107,7 @@ def read_ephemeris(path: str | os.PathLike[str], **conventions: Any) -> Ephemeri
     """
     data, form, name = _opened(path)
     if form.ephemeris is None:
-        raise ValueError(f"{name}: the file holds no ephemeris")
+        raise ValueError(f"{name}: the file holds measurements, no orbit; read_tracking reads it")
     found: Ephemeris = _reader(form.ephemeris)(data, name, Conventions.of(**conventions))
     return found
 

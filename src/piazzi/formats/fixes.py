@@ -1,0 +1,63 @@
+"""Ephemerides as observations: each state is a fix of three rows, or six."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from piazzi.formats.ephemeris import Arc, Ephemeris
+from piazzi.formats.joining import concatenate
+from piazzi.formats.observations import Observations, Segment
+
+Array = np.ndarray[Any, Any]
+POSITION, VELOCITY = ("x", "y", "z"), ("vx", "vy", "vz")
+
+
+def fixes_of(ephemeris: Ephemeris) -> Observations:
+    """Rows of all states, those of one state after another; NaN positions are left out and counted.
+
+    Sigmas are those of the states, or the roots of the diagonal of a covariance of the same instant and axes.
+    Raises ValueError where there is no state: mean elements are no measurements.
+    """
+    if not ephemeris.arcs:
+        raise ValueError(f"{ephemeris.file}: the file holds mean elements, which are no measurements; read_ephemeris reads it")
+    rows = concatenate(_fixes(arc, ephemeris.file) for arc in ephemeris.arcs)
+    lost = sum(int(np.isnan(arc.position).any(axis=1).sum()) for arc in ephemeris.arcs)
+    left_out = (*ephemeris.left_out, *((("states without a position", lost),) if lost else ()))
+    known = [bool(np.isfinite(rows.sigma[rows.segment == i]).all()) for i in range(len(rows.segments))]
+    open_ = ephemeris.open if all(known) else (*ephemeris.open, "standard deviations of fixes: --sigma x=...m")
+    return replace(rows, assumed=ephemeris.assumed, open=open_, left_out=left_out)
+
+
+def _fixes(arc: Arc, file: str) -> Observations:
+    good = ~np.isnan(arc.position).any(axis=1)
+    with_velocity = bool(len(arc)) and not np.isnan(arc.velocity[good]).any() and bool(good.any())
+    kinds = (*POSITION, *VELOCITY) if with_velocity else POSITION
+    parts = [arc.position, arc.velocity] if with_velocity else [arc.position]
+    sigma = _sigmas(arc, len(kinds))
+    frame, count, width = arc.frame, int(good.sum()), len(kinds)
+    said = tuple(pair for pair in arc.said if pair[0] not in ("TIME_SYSTEM", "REF_FRAME"))
+    return Observations(
+        epoch=arc.epoch, t=np.repeat(arc.t[good], width), value=np.hstack(parts)[good].reshape(-1),
+        kinds=kinds, kind=np.tile(np.arange(width), count), line=np.repeat(arc.lines[good], width),
+        participants=(arc.name or arc.identifier,), object=np.array(0), files=(file,),
+        segments=(Segment(arc.scale or "TT", participants=(arc.name or arc.identifier,), frame=frame, said=said),),
+        sigma=np.array(np.nan) if np.isnan(sigma).all() else sigma[good].reshape(-1),
+    )  # fmt: skip
+
+
+def _sigmas(arc: Arc, width: int) -> Array:
+    """(K, width) standard deviations, NaN where there is none."""
+    out = np.full((len(arc), width), np.nan)
+    out[:, :3] = arc.sigma
+    same = [i for i, frame in enumerate(arc.covariance_frames) if frame == arc.frame]
+    if same:
+        times = arc.covariance_t[same]
+        order = np.argsort(times, kind="stable")
+        nearest = np.clip(np.searchsorted(times[order], arc.t), 0, len(same) - 1)
+        hit = times[order][nearest] == arc.t
+        roots = np.sqrt(np.maximum(np.diagonal(arc.covariance[same], axis1=1, axis2=2), 0.0))[order][nearest]
+        out[hit] = roots[hit, :width]
+    return out
