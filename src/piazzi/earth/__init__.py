@@ -9,6 +9,7 @@ from piazzi.earth.formula import Formula
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
 from piazzi.earth.ilrs import ilrs_stations
 from piazzi.earth.rotation import FRAMES, rotation, rotation_rate, transform
+from piazzi.earth.satellites import LASER_SPHERES, LaserSphere, laser_sphere
 from piazzi.earth.station_files import read_stations
 from piazzi.earth.stations import (
     Coordinates,
@@ -23,8 +24,9 @@ from piazzi.earth.tides import pole_tide, solid_tide, station_displacement
 from piazzi.earth.weather import Weather
 
 __all__ = [
-    "BODIES", "EOP", "FRAMES", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch", "Formula", "GravityField",
-    "Station", "StationList", "StationWarning", "Weather", "azimuth_elevation_range", "body", "geodetic_to_position",
-    "gravity_field", "ilrs_stations", "media", "pole_tide", "position_to_geodetic", "read_eop", "read_gravity",
-    "read_stations", "rotation", "rotation_rate", "solid_tide", "station_displacement", "transform", "up_north_east",
+    "BODIES", "EOP", "FRAMES", "LASER_SPHERES", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch", "Formula",
+    "GravityField", "LaserSphere", "Station", "StationList", "StationWarning", "Weather", "azimuth_elevation_range", "body",
+    "geodetic_to_position", "gravity_field", "ilrs_stations", "laser_sphere", "media", "pole_tide", "position_to_geodetic",
+    "read_eop", "read_gravity", "read_stations", "rotation", "rotation_rate", "solid_tide", "station_displacement",
+    "transform", "up_north_east",
 ]  # fmt: skip
