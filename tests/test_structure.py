@@ -36,7 +36,7 @@ __init__
 cli
 __main__
 """
-IMPORTED_AS = {"pyerfa": "erfa"}  # where a package and its module have different names
+IMPORTED_AS = {"ccsds-ndm-py": "ccsds_ndm", "pyerfa": "erfa"}  # where a package and its module have different names
 RANK = {stage: rank for rank, line in enumerate(STAGES.split("\n")) for stage in line.split()}
 
 

@@ -56,10 +56,9 @@ def _span(arc: Arc) -> Iterator[str]:
         if useable is not None:
             yield f"{keyword} = {date(scale, useable)}"
     yield f"STOP_TIME = {last}"
-    if arc.interpolation:
+    if arc.interpolation and arc.degree is not None:  # neither without the other
         yield f"INTERPOLATION = {plain(arc.interpolation).upper()}"
-        if arc.degree is not None:
-            yield f"INTERPOLATION_DEGREE = {arc.degree}"
+        yield f"INTERPOLATION_DEGREE = {arc.degree}"
 
 
 def _states(arc: Arc) -> Iterator[str]:
