@@ -10,7 +10,7 @@ from piazzi import __version__
 from piazzi.cli.options import Group
 from piazzi.text import nearest
 
-COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "study", "windows", "observability", "report")
+COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "study", "windows", "observability", "report", "tracking")
 
 
 class Commands(Group):
@@ -41,6 +41,7 @@ def piazzi() -> None:
 
     Examples:
       piazzi demo -o demo                       a first look: tables and pictures
+      piazzi tracking pass.tdm                  what is in a file of tracking data
       piazzi estimate tracking.npz              the orbit, and how sure it is
       piazzi compare b612-range --with ekf --with graph
       piazzi windows tracking.npz               how long a window has to be

@@ -123,14 +123,15 @@ def check_places(given: Mapping[str, Any]) -> None:
     click.UsageError
         Where a file that is written is one that is read, or is written twice, by whatever names.
     """
-    sources = given.get("sources") or (given.get("source"),)
+    sources = given.get("sources") or given.get("files") or (given.get("source"),)
     scenario = "--scenario" if {"source", "sources"} & given.keys() else "SCENARIO"
     read = [*(("SOURCE", s, 0) for s in sources), (scenario, given.get("scenario"), 0), ("--follow", given.get("follow"), 0)]
     output = given.get("output_file")
     printed = given.get("follow") is not None and output is None  # estimates of a stream come while it is read
     written = [("-o", STREAM if printed else output, 1), ("--checkpoint", given.get("checkpoint"), 1)]
+    written.append(("--to", given.get("target"), 1))
     for (label, path, key), (other, second, also) in combinations([*_keyed(written), *_keyed(read)], 2):
-        if key == also and label in ("-o", "--checkpoint"):
+        if key == also and label in ("-o", "--checkpoint", "--to"):
             first, then = (_shown(*place) for place in ((label, path), (other, second)))
             raise click.UsageError(f"{first} and {then} are the same file", click.get_current_context(silent=True))
 
