@@ -64,6 +64,7 @@ WEIGHT: tuple[float, ...]
 
 # functions of the language, as far as fragments use them
 atan2: Any
+exp: Any
 fabs: Any
 log: Any
 sin: Any
@@ -139,6 +140,8 @@ squared_lanes: Any
 nees_lanes: Any
 # written in fragments/kepler.py
 kepler_motion: Any
+# written in fragments/lambert.py
+lambert_velocities: Any
 # written in fragments/border.py
 rotate: Any
 invert_upper: Any

@@ -1,12 +1,20 @@
-"""Orbits of single bodies: elements, axes and covariances, two-body motion."""
+"""Orbits of single bodies: elements, axes and covariances, two-body motion, and orbits from a few observations."""
 
 from piazzi.orbit.axes import covariance_root, orbit_axes, state_axes, transform_covariance, transform_root
+from piazzi.orbit.double_r import double_r
 from piazzi.orbit.equinoctial import Equinoctial, ModifiedEquinoctial
+from piazzi.orbit.from_directions import gauss, laplace
+from piazzi.orbit.from_positions import gibbs, herrick_gibbs
+from piazzi.orbit.from_ranges import direction, direction_rate, range_to_state, three_ranges
+from piazzi.orbit.gooding import gooding
+from piazzi.orbit.initial import InitialOrbit
 from piazzi.orbit.keplerian import Keplerian
 from piazzi.orbit.lambert import Transfer, lambert, lambert_all
 from piazzi.orbit.two_body import kepler_transition, propagate_kepler
 
 __all__ = [
-    "Equinoctial", "Keplerian", "ModifiedEquinoctial", "Transfer", "covariance_root", "kepler_transition", "lambert",
-    "lambert_all", "orbit_axes", "propagate_kepler", "state_axes", "transform_covariance", "transform_root",
+    "Equinoctial", "InitialOrbit", "Keplerian", "ModifiedEquinoctial", "Transfer", "covariance_root", "direction",
+    "direction_rate", "double_r", "gauss", "gibbs", "gooding", "herrick_gibbs", "kepler_transition", "lambert",
+    "lambert_all", "laplace", "orbit_axes", "propagate_kepler", "range_to_state", "state_axes", "three_ranges",
+    "transform_covariance", "transform_root",
 ]  # fmt: skip
