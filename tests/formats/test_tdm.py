@@ -191,6 +191,8 @@ ROW = "RANGE = 2020-01-01T00:00:00 1000"
         (message(["RANGE = 2020-02-30T00:00:00 1"]), 12, "'2020-02-30T00:00:00' is no date"),
         (message(["RANGE = 2020-01-01T00:00:00 nan"]), 12, "'nan' is no number"),
         (message(["RANGE = 2020-01-01T00:00:00 1e999"]), 12, "'1e999' is no number"),
+        (message(["RANGE = 2020-01-01T00:00:00 1e308"]), 12, "'1e308' is no number"),  # of km, it is beyond all numbers in m
+        ('<?xml version="1.0" encoding="utf-7"?><tdm/>', 1, "no XML that can be read"),
         (message(["RANGE 2020-01-01T00:00:00 = 1"]), 12, "a line of data is KEYWORD = date value"),
         (message(["RANGE = 2020-01-01T00:00:00 " + "1" * 5000]), 12, "is no number"),
         (message([ROW, "RANGE = 1959-01-01T00:00:00 1"]), 13, "no UTC before 1960"),

@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from tests.fuzz import mutate
+from tests.fuzz import mutate, tracked
 from tests.fuzz.case import Case
 from tests.fuzz.child import End, call
 
@@ -508,7 +508,20 @@ class StudyLog(Study):
         return self.HEAD.pack(self.magic, len(payload), sha256(payload).digest()) + payload
 
 
+class TdmFormat(tracked.Tdm, Format):
+    """Tracking Data Messages."""
+
+
+class OemFormat(tracked.Oem, Format):
+    """Orbit Ephemeris Messages."""
+
+
+class OpmFormat(tracked.Opm, Format):
+    """Orbit Parameter and Mean Elements Messages."""
+
+
 FORMATS: dict[str, type[Format]] = {
     "scenario": Scenario, "csv": Csv, "npz": Npz, "nc": NetCdf, "checkpoint": Checkpoint, "follow": Follow,
     "log": StudyLog, "store": StudyStore, "expression": Expression,
+    "tdm": TdmFormat, "oem": OemFormat, "opm": OpmFormat,
 }  # fmt: skip

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 FUZZ = Path(__file__).with_name("fuzz.py")
-FORMATS = ["scenario", "csv", "npz", "nc", "checkpoint", "follow", "log", "store", "expression"]
+FORMATS = ["scenario", "csv", "npz", "nc", "checkpoint", "follow", "log", "store", "expression", "tdm", "oem", "opm"]
 
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="children with limits are made as Linux makes them"

@@ -11,6 +11,7 @@ Array = np.ndarray[Any, Any]
 
 CHUNK = 2**20  # bytes of lines that are taken at once: what is made of them stays in the caches, and small
 LONGEST = 64
+LARGEST = 1e280
 _NUMERIC = np.zeros(256, dtype=np.bool_)
 _NUMERIC[[0, *b"0123456789+-.eEdD"]] = True
 
@@ -90,7 +91,7 @@ def coded(words: Array) -> tuple[list[bytes], Array]:
 def read_numbers(words: Array) -> tuple[Array, Array]:
     """Numbers of a column of words, NaN where one is none, and a mask of those.
 
-    Digits, a point, an exponent behind e or d: no names of infinity, no underscores.
+    Digits, a point, an exponent behind e or d: no names of infinity, no underscores, nothing beyond what any unit may multiply.
     """
     letters = np.ascontiguousarray(words).view(np.uint8).reshape(len(words), -1)
     bad = ~_NUMERIC[letters].all(axis=1)
@@ -102,7 +103,7 @@ def read_numbers(words: Array) -> tuple[Array, Array]:
         values = np.where(bad, b"nan", words).astype(np.float64) if bad.any() else words.astype(np.float64)
     except ValueError:
         values = np.array([_number(word) for word in words.tolist()])
-    return values, bad | ~np.isfinite(values)
+    return values, bad | ~(np.abs(values) < LARGEST)
 
 
 def _number(word: bytes) -> float:

@@ -25,7 +25,8 @@ def fixes_of(ephemeris: Ephemeris) -> Observations:
         raise ValueError(f"{ephemeris.file}: the file holds mean elements, which are no measurements; read_ephemeris reads it")
     rows = concatenate(_fixes(arc, ephemeris.file) for arc in ephemeris.arcs)
     lost = sum(int(np.isnan(arc.position).any(axis=1).sum()) for arc in ephemeris.arcs)
-    left_out = (*ephemeris.left_out, *((("states without a position", lost),) if lost else ()))
+    reasons = {"states without a position": lost, "sets of mean elements": len(ephemeris.mean)}
+    left_out = (*ephemeris.left_out, *((reason, count) for reason, count in reasons.items() if count))
     known = [bool(np.isfinite(rows.sigma[rows.segment == i]).all()) for i in range(len(rows.segments))]
     open_ = ephemeris.open if all(known) else (*ephemeris.open, "standard deviations of fixes: --sigma x=...m")
     return replace(rows, assumed=ephemeris.assumed, open=open_, left_out=left_out)

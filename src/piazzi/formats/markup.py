@@ -62,5 +62,7 @@ def walk(
         parser.Parse(data, True)
     except expat.ExpatError as error:
         source.refuse(error.lineno, f"the file is no whole XML: {one_line(expat.ErrorString(error.code), 80)}")
-    except (UnicodeError, LookupError) as error:
-        source.refuse(1, f"the file is no XML that can be read: {one_line(str(error), 80)}")
+    except (ValueError, LookupError) as error:
+        if str(error).startswith(f"{source.name}: line "):
+            raise
+        source.refuse(1, f"the file is no XML that can be read: {one_line(str(error), 80)}")  # an encoding that expat has not

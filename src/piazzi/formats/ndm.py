@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple, NoReturn
 
 from piazzi.earth import FRAMES, Epoch
 from piazzi.earth.scales import SCALES
+from piazzi.formats.columns import LARGEST
 from piazzi.text import one_line, suggest
 
 _FRAME_WORDS = {"TOD_EARTH": "TOD", "MOD_EARTH": "MOD", "J2000": "EME2000", "TOD_IAU2006": "TOD", "PEF_IAU2006": "PEF"}
@@ -42,7 +42,7 @@ class Source(NamedTuple):
         """The finite number of an item."""
         if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", item.text, re.ASCII):
             value = float(item.text.replace("d", "e").replace("D", "e"))
-            if math.isfinite(value):
+            if abs(value) < LARGEST:
                 return value
         self.refuse(item.line, f"{item.keyword} is {shown(item.text)}; it must be a number")
 

@@ -1,0 +1,48 @@
+"""A million lines: how long they take, and how much memory at their peak."""
+
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from tests.formats.test_tdm import message
+
+LINES = 1_000_000
+
+
+@pytest.fixture(scope="module")
+def million(tmp_path_factory):
+    rng = np.random.default_rng(1)
+    keywords = ["RANGE", "DOPPLER_INSTANTANEOUS", "ANGLE_1", "ANGLE_2"]
+    when = (np.datetime64("2020-01-01T00:00:00.000") + np.arange(LINES // 4) * np.timedelta64(500, "ms")).astype(str).tolist()
+    values = rng.uniform(-90, 90, LINES).tolist()
+    data = [f"{keywords[i % 4]} = {when[i // 4]} {value:.9f}" for i, value in enumerate(values)]
+    path = tmp_path_factory.mktemp("large") / "a.tdm"
+    path.write_text(message(data, ANGLE_TYPE="AZEL"))
+    return path, values
+
+
+@pytest.mark.slow
+def test_a_million_lines_are_read_in_three_seconds(million):
+    path, values = million
+    pz.read_tracking(path)  # imports and tables
+    started = time.process_time()
+    rows = pz.read_tracking(path)
+    assert time.process_time() - started < 3.0
+    assert len(rows) == LINES
+    factor = np.tile([1e3, 1e3, np.pi / 180, np.pi / 180], LINES // 4)
+    np.testing.assert_allclose(rows.value, np.array([float(f"{value:.9f}") for value in values]) * factor, rtol=1e-15)
+
+
+@pytest.mark.slow
+def test_a_row_takes_two_hundred_bytes_at_most(million):
+    path, _ = million
+    tracemalloc.start()
+    try:
+        rows = pz.read_tracking(path)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak / len(rows) < 200
