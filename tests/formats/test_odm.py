@@ -287,6 +287,11 @@ META_STOP
 """
 
 
+def test_names_may_have_brackets(tmp_path):
+    (tmp_path / "a").write_text(OEM.replace("OBJECT_NAME = A", "OBJECT_NAME = DEBRIS [1993-036A]"))
+    assert pz.read_ephemeris(tmp_path / "a").objects == ("DEBRIS [1993-036A]",)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "says"),
     [

@@ -95,7 +95,8 @@ def lines_of(data: bytes) -> list[str]:
     return data.decode("utf-8", "replace").removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
-_KEY_VALUE = re.compile(r"([A-Za-z0-9_]+)\s*=\s*(.*?)\s*(?:\[([^\[\]]*)\])?", re.DOTALL)
+_KEY_VALUE = re.compile(r"([A-Za-z0-9_]+)\s*=\s*(.*)", re.DOTALL)
+_WITH_UNIT = re.compile(r"([-+0-9.eEdD]+)\s*\[([^\[\]]*)\]")  # names may have brackets, too
 
 
 def key_value(source: Source, text: str, line: int) -> Item | None:
@@ -106,7 +107,8 @@ def key_value(source: Source, text: str, line: int) -> Item | None:
     match = _KEY_VALUE.fullmatch(stripped)
     if match is None:
         source.refuse(line, f"{shown(stripped)} is no line of the form KEYWORD = value")
-    return Item(match[1].upper(), match[2], line, match[3] or "")
+    with_unit = _WITH_UNIT.fullmatch(match[2])
+    return Item(match[1].upper(), with_unit[1], line, with_unit[2]) if with_unit else Item(match[1].upper(), match[2], line)
 
 
 def single(source: Source, items: Sequence[Item], what: str) -> dict[str, Item]:
