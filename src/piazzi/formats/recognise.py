@@ -42,10 +42,19 @@ def _root(element: bytes) -> Callable[[bytes], bool]:
     return lambda head: compiled.match(head) is not None
 
 
+def _in_columns(pattern: bytes) -> Callable[[bytes], bool]:
+    """Whether the first line with anything in it, past the headers of a report of astrometry, is like that in its columns."""
+    compiled = re.compile(rb"(?:[ \t\r]*\n|(?:[A-Z]{3}|AC2|---)[ -][^\n]*\n)*" + pattern + rb"[ \r]*(?:\n|\Z)")
+    return lambda head: compiled.match(head) is not None
+
+
 FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "SP3": Format(_begins(rb"#[a-d][PV ]"), ephemeris="sp3:read"),
     "CPF": Format(_begins(_REMARKS + rb"[Hh]1\s+[Cc][Pp][Ff]\s"), ephemeris="cpf:read"),
     "CRD": Format(_begins(_REMARKS + rb"[Hh]1\s"), tracking="crd:read"),
+    "MPC": Format(_in_columns(rb"[^\n]{14}[^\n]\d{4} [ \d]\d [ \d]\d[^\n]{54}\S"), tracking="mpc:read"),
+    "ADES": Format(_begins(rb"(?:[#!][^\n]*\n)*[^\n|]*\|(?:[^\n]*\|)?\s*obsTime\s*[|\n]"), tracking="ades:read_psv"),
+    "ADES XML": Format(_root(rb"ades"), tracking="ades:read_xml"),
     "TDM": Format(_begins(rb"CCSDS_TDM_VERS\s*="), tracking="tdm:read_kvn"),
     "TDM XML": Format(_root(rb"tdm"), tracking="tdm:read_xml"),
     "OEM": Format(_begins(rb"CCSDS_OEM_VERS\s*="), ephemeris="oem:read_kvn"),
