@@ -124,7 +124,8 @@ def test_each_mistake_has_one_line(tmp_path, lines, what):
         ("     K07Tf8A", "2007 TA418"),
         ("     I98D00Q", "1898 DQ"), ("     J04O00A", "1904 OA"), ("     PLS2040", "2040 P-L"), ("     T3S4101", "4101 T-3"),
         ("     _QC0000", "2026 CA620"), ("     _QC0aEM", "2026 CZ6190"), ("     _QCzzzz", "2026 CL591673"),
-        ("0001P", "1P"), ("0003D", "3D"), ("0073P      b", "73P-B"), ("    CJ95O010", "C/1995 O1"), ("    DJ93F02b", "D/1993 F2-B"),
+        ("0001P", "1P"), ("0003D", "3D"), ("0073P      b", "73P-B"), ("    CJ95O010", "C/1995 O1"),
+        ("    DJ93F02b", "D/1993 F2-B"),
         ("    PJ99XC0N", "P/1999 XN120"), ("J013S", "Jupiter 13"), ("    SK04S010", "S/2004 S 1"), ("     mine   ", "mine"),
     ],
 )  # fmt: skip
@@ -190,7 +191,8 @@ OPTICAL = (
 )
 RADAR = (
     TIME
-    + "<trx>251</trx><rcv>253</rcv><delay>15.1</delay><rmsDelay>2.5</rmsDelay><doppler>-1e4</doppler><rmsDoppler>0.5</rmsDoppler>"
+    + "<trx>251</trx><rcv>253</rcv><delay>15.1</delay><rmsDelay>2.5</rmsDelay>"
+    + "<doppler>-1e4</doppler><rmsDoppler>0.5</rmsDoppler>"
 )
 
 
