@@ -54,11 +54,14 @@ if TYPE_CHECKING:
     from piazzi.problem import (
         Gaussian,
         Manoeuvre,
+        Pass,
         Problem,
         ProcessNoise,
+        Schedule,
         Station,
         Tracking,
         Truth,
+        passes,
         with_gauss_markov,
     )
     from piazzi.simulation import simulate
@@ -73,7 +76,8 @@ _WHERE = {
         "Ralston RungeKutta RungeKutta4 RungeKutta8 Taylor",
         "piazzi.earth": "Epoch",
         "piazzi.formats": "Ephemeris Observations read_ephemeris read_tracking",
-        "piazzi.problem": "Gaussian Manoeuvre Problem ProcessNoise Station Tracking Truth with_gauss_markov",
+        "piazzi.problem": "Gaussian Manoeuvre Pass Problem ProcessNoise Schedule Station Tracking Truth passes "
+        "with_gauss_markov",
         "piazzi.orbit": "kepler_transition propagate_kepler",
         "piazzi.simulation": "simulate",
         "piazzi.estimate.bank": "Bank",
@@ -111,12 +115,12 @@ __all__ = [
     "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Discrete", "DormandPrince",
     "DormandPrince5", "Ephemeris", "Epoch", "Estimate", "Euler", "ExtendedKalmanFilter", "FactorGraph", "Forecast",
     "Gaussian", "Heun", "Huber", "Integrator", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre",
-    "Midpoint", "Model", "Observability", "Observations", "Parameter", "Prediction", "Problem", "ProcessNoise", "Ralston",
-    "RungeKutta", "RungeKutta4", "RungeKutta8", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station",
-    "Study", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps",
-    "compare", "earth", "kepler_transition", "load", "observability", "orbit", "predict", "propagate_kepler",
-    "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning", "substep_error", "update", "windows",
-    "with_gauss_markov", "with_prior_at", "write_report",
+    "Midpoint", "Model", "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise",
+    "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother",
+    "SquareRootKalmanFilter", "Station", "Study", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter",
+    "Updated", "WindowTrade", "choose_substeps", "compare", "earth", "kepler_transition", "load", "observability", "orbit",
+    "passes", "predict", "propagate_kepler", "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning",
+    "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip
 
 

@@ -38,6 +38,19 @@ TABLE: Mapping[str, tuple[float, tuple[int, int, int, int]]] = {
 }  # fmt: skip
 
 _FACTOR = re.compile(r"\s*(?:1|([A-Za-z]+)\s*(?:\^\s*([+-]?\d{1,2}(?:\.\d{1,3})?))?)\s*")
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z].*)", re.ASCII)
+
+
+def is_quantity(value: object) -> bool:
+    """Whether this is text of a number with a unit."""
+    return isinstance(value, str) and _QUANTITY.fullmatch(value[:100]) is not None
+
+
+def size_of(text: str) -> float:
+    """The number of a text that `is_quantity`."""
+    match = _QUANTITY.fullmatch(text)
+    assert match is not None
+    return float(match[1])
 
 
 @dataclass(frozen=True)
@@ -107,6 +120,13 @@ class Units:
         if not 0 < factor < math.inf:
             raise ValueError(f"unit {text!r} is out of range")
         return Unit(factor, tuple(powers), label(powers))
+
+    def quantity(self, text: str) -> tuple[float, Unit]:
+        """Number and unit of a text such as "10 deg"; raises ValueError for what is none, or an unknown unit."""
+        match = _QUANTITY.fullmatch(text) if len(text) <= 100 else None
+        if match is None:
+            raise ValueError(f"{text[:80]!r} is no number with a unit, such as '10 deg'")
+        return float(match[1]), self.unit(match[2])
 
     def _named(self, name: str) -> tuple[float, tuple[int, int, int, int]]:
         if name in DIMENSIONS:

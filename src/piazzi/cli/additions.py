@@ -69,7 +69,7 @@ def _once_more(problem: Problem, name: str, taken: set[str]) -> Station:
     if name not in names:
         raise ValueError(f"no station has this name{nearest(name, names)}; a new one is written {SYNTAX}")
     found = problem.stations[names.index(name)]
-    return Station(_free(name, taken), found.sensor, found.noise, found.numbers)
+    return Station(_free(name, taken), found.sensor, found.noise, found.numbers, schedule=found.schedule)
 
 
 def _numbers(text: str) -> tuple[dict[str, float], list[float], bool]:

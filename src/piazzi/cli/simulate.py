@@ -91,9 +91,11 @@ def command(
 def to_dict(problem: Problem, tracking: Tracking, name: str, seed: int, output_file: str | None) -> dict[str, Any]:
     """What was simulated, in numbers; the tracking itself is in the file."""
     from piazzi.problem.epochs import dated
+    from piazzi.problem.gaps import in_passes
     from piazzi.simulation import true_problem
 
     assert tracking.truth is not None
+    found = in_passes(problem, tracking)
     return {
         "schema": SCHEMA,
         "source": name,
@@ -107,6 +109,7 @@ def to_dict(problem: Problem, tracking: Tracking, name: str, seed: int, output_f
         "units": {n: problem.model.unit(n) for n in problem.model.names},
         "first": {"time": float(tracking.times[0]), "truth": tracking.truth[0].tolist()},
         "final": {"time": float(tracking.times[-1]), "truth": tracking.truth[-1].tolist()},
+        **({"passes": [one._asdict() for one in found]} if found else {}),
         "output": output_file,
     }
 

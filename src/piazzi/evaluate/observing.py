@@ -17,6 +17,7 @@ from piazzi.model import Sensor
 from piazzi.problem import Problem, ProcessNoise, Station, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs, prepare
+from piazzi.simulation import seen, true_problem
 
 Addition = Station | tuple[Sensor, Station]
 _POINTS = 400  # epochs after which the growing information is kept
@@ -58,7 +59,7 @@ def observability(
     found = replace(found, attempts=attempts(problem, tracking, found.twins), message=message)
     if more is None:
         return found
-    wider = _with_rows(tracking, problem, more)
+    wider = _with_rows(tracking, problem, more, states)
     return replace(found, added=_observability(more, wider, prepare(more, wider), states, about, twins, source))
 
 
@@ -133,10 +134,10 @@ def _epochs(K: int) -> Array:
     return np.unique(np.concatenate([np.geomspace(1, K, half), np.linspace(1, K, half)]).round().astype(np.int64)) - 1
 
 
-def _with_rows(tracking: Tracking, problem: Problem, more: Problem) -> Tracking:
+def _with_rows(tracking: Tracking, problem: Problem, more: Problem, states: Array) -> Tracking:
     """The tracking with a row for each further station at every epoch, behind those that are there.
 
-    Their values are of no account, as long as they are there.
+    Their values are of no account, as long as they are there: at states (K, n) that a station does not see, they are not.
     """
     width, new = more.model.width, more.stations[len(problem.stations) :]
     K, S = len(tracking.times), len(more.stations) - len(problem.stations)
@@ -146,6 +147,7 @@ def _with_rows(tracking: Tracking, problem: Problem, more: Problem) -> Tracking:
     old = tracking.row_stations if tracking.row_stations is not None else [problem.stations[0].name] * len(tracking.row_times)
     times = np.concatenate([tracking.row_times, np.repeat(tracking.times, S)])
     order = np.argsort(times, kind="stable")
-    values = np.concatenate([tracking.padded(width), np.tile(extra, (K, 1))])[order]
+    marks = seen(true_problem(more), tracking.times, states)[:, -S:].reshape(-1, 1)
+    values = np.concatenate([tracking.padded(width), np.where(marks, np.tile(extra, (K, 1)), np.nan)])[order]
     names = np.concatenate([old, np.tile([s.name for s in new], K)])[order]
     return Tracking(times[order], values, names, tracking.truth, tracking.epoch)

@@ -52,7 +52,8 @@ class KernelSpec:
         """Hash of everything that the compiled module depends on, this machine and the generator's own text included."""
         own = tuple(_fragment(name) for name in self.fragments)
         added = tuple((f.name, f.partials, f.code) for f in TABLE.values() if f.code)
-        return hashlib.sha256(repr((self, own, added, _surroundings())).encode()).hexdigest()[:32]
+        numbers = [self.model.numbers(sensor) for sensor in self.model.sensors]  # those of rules of visibility among them
+        return hashlib.sha256(repr((self, numbers, own, added, _surroundings())).encode()).hexdigest()[:32]
 
     def source(self, backend: str) -> str:
         """The module's source for the "compiled" or the "plain" vocabulary; raises ValueError where its parts do not fit."""

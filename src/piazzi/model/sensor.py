@@ -53,6 +53,8 @@ class Sensor:
     number_units : mapping of the sensor's own numbers to units, for those that are estimated
     definitions : mapping of name to equation
         Values that the sensor's equations use by name; see `Model`.
+    visible : sequence of equations
+        Rules of states, parameters, definitions, numbers and `t`: a simulated station measures where all are above zero.
 
     Raises
     ------
@@ -66,6 +68,7 @@ class Sensor:
     units: Mapping[str, str] = field(default_factory=dict)
     number_units: Any = field(default_factory=dict)
     definitions: Any = field(default_factory=dict)
+    visible: Any = field(default=(), repr=False)  # no kernel, and no checkpoint, depends on it
     components: tuple[str, ...] = field(init=False)
 
     if TYPE_CHECKING:  # what is taken; the fields above say what is kept of it
@@ -78,6 +81,7 @@ class Sensor:
             units: Mapping[str, str] | Sequence[tuple[str, str]] = (),
             number_units: Mapping[str, str] | Sequence[tuple[str, str]] = (),
             definitions: Mapping[str, Any] | Sequence[tuple[str, Any]] = (),
+            visible: Sequence[Any] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -89,6 +93,7 @@ class Sensor:
         if not labelled:
             raise ValueError(f"sensor {self.name!r} has no equations")
         put(self, "definitions", definitions_of(self.definitions, f"sensor {self.name!r}"))
+        put(self, "visible", tuple(text_of(rule) for rule in as_tuple(self.visible, f"sensor {self.name!r}: visible")))
         put(self, "components", tuple(labelled))
         put(self, "equations", tuple(labelled.values()))
         units = dict(self.units)
@@ -100,7 +105,7 @@ class Sensor:
         for name in dict(self.number_units):
             if name not in self.free_names:
                 raise ValueError(f"sensor {self.name!r}: number_units names {name!r}, which no equation uses")
-        for name in unused(self.definitions, self.equations):
+        for name in unused(self.definitions, (*self.equations, *self.visible)):
             raise ValueError(f"sensor {self.name!r}: definition {name!r} is used by no equation")
         put(self, "number_units", tuple((str(n), str(u)) for n, u in dict(self.number_units).items()))
         put(self, "units", tuple((c, units.get(c, "rad" if c in self.angles else "")) for c in labelled))
@@ -132,5 +137,5 @@ class Sensor:
 
     @cached_property
     def free_names(self) -> frozenset[str]:
-        """All names in the equations that the sensor does not define itself."""
-        return needed(self.equations, self.definitions) - {name for name, _ in self.definitions}
+        """All names in the equations and rules that the sensor does not define itself."""
+        return needed((*self.equations, *self.visible), self.definitions) - {name for name, _ in self.definitions}

@@ -14,6 +14,7 @@ from piazzi.evaluate.metrics import errors, residual_rms
 from piazzi.evaluate.quantities import display_of, duration, number, with_sigma
 from piazzi.problem import Problem, Tracking, epoch_of
 from piazzi.problem.checks import Array
+from piazzi.problem.gaps import in_passes
 from piazzi.text import printable
 
 if TYPE_CHECKING:
@@ -34,9 +35,11 @@ def summary(problem: Problem, tracking: Tracking, source: str) -> str:
     span += _date(epoch_of(problem, tracking), float(times[0]), " from {}")
     stations = problem.stations[0].name if count == 1 else f"{count} stations"
     missing = int(np.isnan(tracking.values).all(axis=1).sum())
+    found = len(in_passes(problem, tracking))
+    who = f"{stations} in {found:,} passes" if found else stations
     parts = [
         f"{source}: {_count(len(times), 'epoch')}{span}",
-        f"{_count(len(tracking.row_times) - missing, 'measurement')} by {stations}",
+        f"{_count(len(tracking.row_times) - missing, 'measurement')} by {who}",
         *([f"{missing:,} missing"] if missing else []),
         "truth known" if tracking.truth is not None else "truth not known",
         prior_place(problem, tracking.times),

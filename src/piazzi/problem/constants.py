@@ -76,7 +76,8 @@ def _extended(model: Model, sensor: Sensor, station: Station, names: Mapping[str
     equations = {c: _renamed(e, names) for c, e in zip(sensor.components, sensor.equations, strict=True)}
     left = {name: unit for name, unit in units.items() if name not in names}
     definitions = {name: _renamed(e, names) for name, e in sensor.definitions}
-    copy = Sensor(label, equations, sensor.angles, dict(sensor.units), left, definitions)
+    visible = [_renamed(rule, names) for rule in sensor.visible]
+    copy = Sensor(label, equations, sensor.angles, dict(sensor.units), left, definitions, visible)
     return replace(model, parameters=(*model.parameters, *constants), sensors=(*model.sensors, copy))
 
 

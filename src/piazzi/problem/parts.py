@@ -63,6 +63,46 @@ class ProcessNoise(Locked):
         return np.ones(len(intervals)) if self.per == "step" else intervals
 
 
+@dataclass(frozen=True)
+class Schedule:
+    """At which of the times of a simulation a station measures: from `start` to `until`, both included, once `every` seconds.
+
+    Times are the same that differ by a nanosecond, or by what rounding leaves.  Times of `every` count from `start`, or else
+    from zero.
+    """
+
+    every: float | None = None
+    start: float | None = None
+    until: float | None = None
+
+    def __post_init__(self) -> None:
+        for what in ("every", "start", "until"):
+            value = getattr(self, what)
+            if value is not None and not np.isfinite(value):
+                raise ValueError(f"schedule: {what} is {value}; it must be finite")
+        if self.every is not None and self.every <= 0:
+            raise ValueError(f"schedule: every is {self.every:g} s; it must be positive")
+        if self.start is not None and self.until is not None and self.until < self.start:
+            raise ValueError(f"schedule: until is {self.until:g} s, before the start at {self.start:g} s")
+
+    def __str__(self) -> str:
+        said = (("every", self.every), ("from", self.start), ("until", self.until))
+        return " ".join(f"{word} {value:g} s" for word, value in said if value is not None)
+
+    def has(self, times: Array) -> Array:
+        """Which of these times are in it."""
+        near = 1e-9 + 1e-15 * np.abs(times)
+        out = np.ones(np.shape(times), dtype=bool)
+        if self.start is not None:
+            out &= times >= self.start - near
+        if self.until is not None:
+            out &= times <= self.until + near
+        if self.every is not None:
+            since = times - (self.start or 0.0)
+            out &= np.abs(since - self.every * np.round(since / self.every)) <= near
+        return out
+
+
 @dataclass(frozen=True, eq=False)
 class Station(Locked):
     """A place that measures: a sensor of the model, its noise R (m, m) and the sensor's own numbers.
@@ -70,6 +110,7 @@ class Station(Locked):
     `noise` is a full covariance matrix, a diagonal, or one variance; SI units and radians.  A number that is not known for
     certain is a ``Gaussian(mean, variance)``: it is estimated with the states, under its own name and the station's
     (``bias`` of station ``north`` is ``bias_north``), or, where `considered` names it, inflates the covariance only.
+    `schedule` says when it measures in simulation, beside the sensor's rules of what is visible.
     """
 
     name: str
@@ -77,6 +118,7 @@ class Station(Locked):
     noise: Any
     numbers: Mapping[str, Any] = field(default_factory=dict)
     considered: Sequence[str] = ()
+    schedule: Schedule | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,7 +128,7 @@ class Problem:
                 raise ValueError(f"two stations are called {station.name!r}")
             what = f"measurement noise R of station {station.name!r}"
             noise = covariance(station.noise, sensor.width, what, sensor.components, definite=True)
-            out.append(Station(station.name, station.sensor, noise, self._numbers(station)))
+            out.append(Station(station.name, station.sensor, noise, self._numbers(station), schedule=station.schedule))
         return tuple(out)
 
     def _numbers(self, station: Station) -> dict[str, float]:

@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from piazzi.expressions import check
 from piazzi.model import STEP, TIME, Model, Parameter, Role, Sensor
 from piazzi.model.definitions import name_of
-from piazzi.scenarios.table import Table, shown
+from piazzi.problem.epochs import epoch_given
+from piazzi.problem.parts import Schedule
+from piazzi.scenarios.table import Table, joined, shown
 from piazzi.text import nearest
-from piazzi.units import ONE, Unit, Units
+from piazzi.units import ONE, Unit, Units, is_quantity
+
+if TYPE_CHECKING:
+    from piazzi.earth import Epoch
 
 MAX_STATES = 100
 OWN = "; numbers of each station's own are named in the sensor's numbers"
@@ -20,7 +25,10 @@ OWN = "; numbers of each station's own are named in the sensor's numbers"
 
 @dataclass
 class Physics:
-    """What the equations' half says: the model, None where it is faulty, and the unit of every name."""
+    """What the equations' half says: the model, None where it is faulty, and the unit of every name.
+
+    `defaults` are numbers in SI for stations of a sensor that give none, `schedules` those of stations without their own.
+    """
 
     model: Model | None = None
     states: list[str] = field(default_factory=list)
@@ -31,6 +39,8 @@ class Physics:
     components: dict[str, dict[str, Unit]] = field(default_factory=dict)
     numbers: dict[str, dict[str, Unit]] = field(default_factory=dict)
     definitions: dict[str, str] = field(default_factory=dict)
+    defaults: dict[str, dict[str, float]] = field(default_factory=dict)
+    schedules: dict[str, Schedule | None] = field(default_factory=dict)
 
     @property
     def estimated(self) -> list[str]:
@@ -48,7 +58,7 @@ def shared(model: Model) -> Model:
     return model
 
 
-def read_physics(file: Table, units: Units) -> Physics:
+def read_physics(file: Table, units: Units, epoch: Epoch | None = None) -> Physics:
     """Read [states], [memory], [groups], [dynamics] or [step], [parameters] and [sensors]."""
     before = len(file.faults)
     out = Physics()
@@ -64,7 +74,7 @@ def read_physics(file: Table, units: Units) -> Physics:
     parameters = _parameters(file.table("parameters"), units, out)
     out.definitions = _definitions(file.table("definitions"), {*out.units, TIME, *([STEP] if "step" in file else [])}, out)
     dynamics = _dynamics(file, out)
-    sensors = [_sensor(name, table, units, out) for name, table in file.table("sensors").tables()]
+    sensors = [_sensor(name, table, units, out, epoch) for name, table in file.table("sensors").tables()]
     out.groups = _groups(file, out)
     if len(file.faults) == before:
         labels = {s: out.units[s].label for s in out.states if out.units[s].label}
@@ -156,6 +166,9 @@ def _parameter(name: str, table: Table, units: Units, out: Physics) -> Parameter
         inner = table.table(name)
         role = inner.text("role", "fixed", get_args(Role)) or "fixed"
         unit = unit_of(inner, "unit", units)
+    elif is_quantity(given):
+        with table.faults.at(table.at(name)):
+            unit = units.quantity(given)[1]
     elif units.declared:
         table.fault(name, f"is only a number, but the file is not in SI: write {{ value = ..., unit = {_example(units)} }}")
     with table.faults.at(table.at(name)):
@@ -212,9 +225,10 @@ def equation(table: Table, key: str, allowed: Collection[str], hint: str = "") -
     return text
 
 
-def _sensor(name: str, table: Table, units: Units, out: Physics) -> Sensor | None:
-    """A sensor from its components and the names of its stations' own numbers."""
-    numbers = named_units(table, "numbers", units, "number")
+def _sensor(name: str, table: Table, units: Units, out: Physics, epoch: Epoch | None) -> Sensor | None:
+    """A sensor from its components, the names of its stations' own numbers, and what it sees when."""
+    numbers, out.defaults[name] = _own_numbers(table, units)
+    out.schedules[name] = read_schedule(table, units, epoch)
     for clash in numbers.keys() & out.units.keys():
         table.fault("numbers", f"names {clash!r}, which is also a state or a parameter")
     known = {*out.units, *out.definitions, *numbers, TIME}
@@ -228,16 +242,88 @@ def _sensor(name: str, table: Table, units: Units, out: Physics) -> Sensor | Non
     for key in components.data:
         equations[key], kinds[key], angle = _component(components, key, {*known, *definitions}, units)
         angles += [key] if angle else []
+    visible = _rules(table, {*known, *definitions})
     table.finish()
     out.components[name], out.numbers[name] = kinds, numbers
     with table.faults.at(table.path):
         labels = {k: u.label for k, u in kinds.items() if u.label}
-        used = Sensor(name, equations, tuple(angles), labels, {}, definitions).free_names
+        used = Sensor(name, equations, tuple(angles), labels, {}, definitions, visible).free_names
         own = {k: u.label for k, u in numbers.items() if u.label and k in used}
-        sensor = Sensor(name, equations, tuple(angles), labels, own, definitions)
+        sensor = Sensor(name, equations, tuple(angles), labels, own, definitions, visible)
         for unused in sorted(numbers.keys() - sensor.free_names):
             table.fault("numbers", f"names {unused!r}, which no equation uses{nearest(unused, sorted(sensor.free_names))}")
         return sensor
+    return None
+
+
+def _own_numbers(table: Table, units: Units) -> tuple[dict[str, Unit], dict[str, float]]:
+    """Units of the numbers that a sensor's stations give, and values of those that need not, such as ``mask = "10 deg"``."""
+    given = table.raw("numbers")
+    if not isinstance(given, Mapping) or not any(map(is_quantity, given.values())):
+        return named_units(table, "numbers", units, "number"), {}
+    found: dict[str, tuple[float, Unit]] = {}
+    for name, value in given.items():
+        if is_quantity(value):
+            with table.faults.at(joined(table.at("numbers"), name)):
+                found[name] = units.quantity(value)
+    rest = {name: value for name, value in given.items() if not is_quantity(value)}
+    out = named_units(Table({"numbers": rest}, table.path, table.faults), "numbers", units, "number")
+    for name in found:
+        with table.faults.at(joined(table.at("numbers"), name)):
+            name_of(name, "number")
+    out |= {name: unit for name, (_, unit) in found.items()}
+    out = {name: out[name] for name in given if name in out}
+    return out, {name: value * unit.factor for name, (value, unit) in found.items()}
+
+
+def _rules(table: Table, allowed: Collection[str]) -> tuple[str, ...]:
+    """Equations that are above zero where something can be seen."""
+    rules = table.texts("visible")
+    for i, text in enumerate(rules):
+        with table.faults.at(joined(table.at("visible"), i) if isinstance(table.raw("visible"), list) else table.at("visible")):
+            check(text, allowed)
+    return rules
+
+
+def read_schedule(table: Table, units: Units, epoch: Epoch | None, usual: Schedule | None = None) -> Schedule | None:
+    """The keys every, from and until of a sensor or a station, in SI; `usual` has what is not said."""
+    every = quantity(table, "every", units, "time")
+    start, until = (_time(table, key, units, epoch) for key in ("from", "until"))
+    if (every, start, until) == (None, None, None):
+        return usual
+    usual = usual or Schedule()
+    with table.faults.at(table.path):
+        return Schedule(
+            usual.every if every is None else every,
+            usual.start if start is None else start,
+            usual.until if until is None else until,
+        )
+    return None
+
+
+def quantity(table: Table, key: str, units: Units, kind: str) -> float | None:
+    """A number in the file's unit of that kind, or with its own, in SI."""
+    value, unit = table.raw(key), units.unit(kind)
+    if not isinstance(value, str):
+        return table.number(key, unit.factor)
+    with table.faults.at(table.at(key)):
+        size, own = units.quantity(value)
+        if own.powers != unit.powers:
+            raise ValueError(f"is {shown(value)}, which is no {kind}")
+        return size * own.factor
+    return None
+
+
+def _time(table: Table, key: str, units: Units, epoch: Epoch | None) -> float | None:
+    """A time, or a date where the file has an epoch, in seconds."""
+    value = table.raw(key)
+    if not isinstance(value, str) or is_quantity(value):
+        return quantity(table, key, units, "time")
+    with table.faults.at(table.at(key)):
+        if epoch is None:
+            raise ValueError(f"is {shown(value)}, but the file has no epoch that a date could be counted from")
+        date = epoch_given(value)
+        return None if date is None else float(date - epoch)
     return None
 
 

@@ -162,6 +162,7 @@ def read_scenario(data: Mapping[str, Any], name: str, faults: Faults) -> Scenari
         file.finish(SECTIONS)
         if problem is not None and times is not None:
             _check_size(problem, times, faults)
+            _check_schedules(problem, times, faults)
     if faults or problem is None or times is None:
         return None
     return Scenario(name, title or name, problem, times, picture, plan)
@@ -171,14 +172,14 @@ def read_problem(file: Table, name: str, units: Units, start: float | None = Non
     """The problem, or None after noting every fault; its prior is at `start` unless the file says otherwise."""
     before = len(file.faults)
     epoch = _epoch(file)
-    physics = read_physics(file, units)
+    physics = read_physics(file, units, epoch)
     parameters = read_parameters(file.table("parameters"), physics, physics.model)
     integrator = read_integrator(file.table("integrator"), units)
     if "stations" not in file:
         file.fault("stations", "is missing: write [[stations]] with name, sensor and noise")
     if not physics.states:
         return None
-    stations = read_stations(file, physics)
+    stations = read_stations(file, physics, units, epoch)
     prior, prior_time = read_prior(file.table("prior"), physics, file.table("truth"), units, start)
     noise = read_noise(file.table("process_noise"), physics) if "process_noise" in file else None
     gauss_markov = read_gauss_markov(file.table("gauss_markov"), physics, units) if "gauss_markov" in file else None
@@ -208,6 +209,21 @@ def _units(file: Table) -> Units:
         with file.faults.at("units"):
             return Units.parse(text)
     return Units()
+
+
+def _check_schedules(problem: Problem, times: Array, faults: Faults) -> None:
+    """Note a schedule that has none of the times, or an interval that is no multiple of theirs."""
+    step = times[1] - times[0] if len(times) > 1 else 0.0
+    regular = step > 0 and np.allclose(np.diff(times), step, rtol=1e-9, atol=0)
+    for i, station in enumerate(problem.stations):
+        schedule = station.schedule
+        if schedule is None:
+            continue
+        many = 1.0 if schedule.every is None else schedule.every / step if regular else 1.0
+        if abs(many - round(many)) > 1e-9 * many:
+            faults.add(f"stations[{i}]", f"measures every {schedule.every:g} s, no multiple of the step of [times], {step:g} s")
+        elif not schedule.has(times).any():
+            faults.add(f"stations[{i}]", f"measures {schedule}: at none of the {len(times)} times of [times]")
 
 
 def _check_size(problem: Problem, times: Array, faults: Faults) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,9 +11,12 @@ from piazzi.model import Model
 from piazzi.problem import Gaussian, ProcessNoise, Station
 from piazzi.problem.checks import Array, covariance
 from piazzi.problem.constants import constant_name
-from piazzi.scenarios.equations import Physics
+from piazzi.scenarios.equations import Physics, read_schedule
 from piazzi.scenarios.table import Table, shown
-from piazzi.units import ONE, Units
+from piazzi.units import ONE, Units, is_quantity, size_of
+
+if TYPE_CHECKING:
+    from piazzi.earth import Epoch
 
 FIRST = "first"  # measurement: where a prior stands that goes with any recording
 SPREADS = ("sigma", "variance", "covariance")
@@ -93,8 +96,8 @@ def read_noise(table: Table, physics: Physics) -> ProcessNoise | None:
     return ProcessNoise(Q, per, method, axes)  # type: ignore[arg-type]
 
 
-def read_station(table: Table, physics: Physics) -> Station | None:
-    """A station: its name, sensor, noise and own numbers."""
+def read_station(table: Table, physics: Physics, units: Units, epoch: Epoch | None) -> Station | None:
+    """A station: its name, sensor, noise, own numbers and schedule."""
     sensors = list(physics.components)
     name = table.text("name")
     if name is None and table.raw("name") is None:
@@ -109,7 +112,7 @@ def read_station(table: Table, physics: Physics) -> Station | None:
     if sensor not in physics.components:
         if isinstance(table.raw("noise"), Mapping):
             table.table("noise").finish(SPREADS)
-        table.finish(("noise", "numbers"))
+        table.finish(("noise", "numbers", "every", "from", "until"))
         return None
     components, own = physics.components[sensor], physics.numbers[sensor]
     if not isinstance(table.raw("noise"), Mapping):
@@ -123,17 +126,22 @@ def read_station(table: Table, physics: Physics) -> Station | None:
     before = len(table.faults)
     given = table.table("numbers")
     considered: list[str] = []
-    numbers = {key: _own_number(key, given, own[key].factor, considered) for key in own}
+    usual = physics.defaults.get(str(sensor), {})
+    numbers = {
+        key: usual[key] if key in usual and key not in given else _own_number(key, given, own[key].factor, considered)
+        for key in own
+    }
+    schedule = read_schedule(table, units, epoch, physics.schedules.get(str(sensor)))
     uncertain = [key for key, value in numbers.items() if isinstance(value, Gaussian)]
     physics.units |= {constant_name(key, name): own[key] for key in uncertain if name}
     for key in own:
-        if key not in given:
+        if key not in given and key not in usual:
             table.fault("numbers", f"has no value for {key!r}, which sensor {sensor!r} uses")
     given.finish()
     table.finish()
     if R is None or not name or len(table.faults) > before:
         return None
-    return Station(name, sensor, R, {k: v for k, v in numbers.items() if v is not None}, considered)
+    return Station(name, sensor, R, {k: v for k, v in numbers.items() if v is not None}, considered, schedule)
 
 
 def _own_number(name: str, table: Table, factor: float, considered: list[str]) -> Any:
@@ -152,9 +160,9 @@ def _own_number(name: str, table: Table, factor: float, considered: list[str]) -
     return None if value is None or P is None else Gaussian([value], P)
 
 
-def read_stations(file: Table, physics: Physics) -> list[Station | None]:
+def read_stations(file: Table, physics: Physics, units: Units, epoch: Epoch | None = None) -> list[Station | None]:
     """All stations, None for those that are faulty."""
-    stations = [read_station(table, physics) for table in file.array("stations")]
+    stations = [read_station(table, physics, units, epoch) for table in file.array("stations")]
     seen: set[str] = set()
     for i, station in enumerate(stations):
         if station is not None and station.name in seen:
@@ -171,6 +179,8 @@ def read_parameters(table: Table, physics: Physics, model: Model | None) -> dict
 
 def _parameter(name: str, table: Table, physics: Physics, role: str) -> Any:
     factor = physics.units.get(name, ONE).factor
+    if is_quantity(table.raw(name)):
+        return size_of(table.raw(name)) * factor
     if not isinstance(table.raw(name), Mapping):
         return table.number(name, factor)
     inner = table.table(name)

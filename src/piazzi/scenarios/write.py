@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.model import Model, Parameter, Sensor
-from piazzi.problem import Gaussian, Problem, ProcessNoise, Station, Truth
+from piazzi.problem import Gaussian, Problem, ProcessNoise, Schedule, Station, Truth
 from piazzi.scenarios.loader import read_problem
 from piazzi.scenarios.motion import write_integrator, write_manoeuvre
 from piazzi.scenarios.table import Faults, ScenarioError, Table
@@ -74,6 +74,7 @@ def _equations(model: Model) -> dict[str, Any]:
 def _sensor(model: Model, sensor: Sensor) -> dict[str, Any]:
     rows = zip(sensor.components, sensor.equations, sensor.is_angle, dict(sensor.units).values(), strict=True)
     return {
+        **({"visible": list(sensor.visible)} if sensor.visible else {}),
         "numbers": dict.fromkeys(model.numbers(sensor), "") | dict(sensor.number_units),
         "definitions": dict(sensor.definitions),
         "components": {c: {"equation": e, "unit": unit, "angle": angle} for c, e, angle, unit in rows},
@@ -89,7 +90,13 @@ def _parameter(problem: Problem, parameter: Parameter) -> dict[str, Any]:
 
 def _station(station: Station) -> dict[str, Any]:
     numbers = {k: float(v) for k, v in station.numbers.items()}
-    return {"name": station.name, "sensor": station.sensor, "noise": {"covariance": _listed(station.noise)}, "numbers": numbers}
+    noise = {"covariance": _listed(station.noise)}
+    return {"name": station.name, "sensor": station.sensor, "noise": noise, "numbers": numbers, **_schedule(station.schedule)}
+
+
+def _schedule(schedule: Schedule | None) -> dict[str, float]:
+    said = {} if schedule is None else {"every": schedule.every, "from": schedule.start, "until": schedule.until}
+    return {key: float(value) for key, value in said.items() if value is not None}
 
 
 def _noise(noise: ProcessNoise) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from piazzi.problem import Gaussian, Problem, Tracking, Truth
 from piazzi.problem.checks import Array, check_span, finite_vector, numeric
 from piazzi.problem.inputs import Inputs
 from piazzi.simulation.rule import MOST_DRAWS, NoTruthError, Rule
+from piazzi.simulation.visibility import is_restricted, rules, seen
 
 __all__ = [
     "MOST_DRAWS",
@@ -20,8 +21,11 @@ __all__ = [
     "Rule",
     "check_finite",
     "check_times",
+    "is_restricted",
     "placed",
     "propagate",
+    "rules",
+    "seen",
     "simulate",
     "true_problem",
 ]
@@ -35,14 +39,15 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
     problem : Problem
     times : (K,) seconds, strictly increasing
     rng : numpy.random.Generator
-        The same generator state gives the same bytes.  Draws, in order: first state, process noise, measurement noise.
+        The same generator state gives the same bytes.  Draws, in order: first state, process noise, measurement noise.  Rows
+        that are not measured have draws too, so that no rule of who sees what changes the noise of another row.
     stations : names, optional
-        Who measures, at every time; default all.
+        Who measures; default all: at every time, or where the rules of their sensors and their schedules have it.
 
     Raises
     ------
     ValueError
-        For bad times, unknown stations, or a truth that becomes infinite.
+        For bad times, unknown stations, a truth that becomes infinite, or nothing to be seen.
     """
     epochs = check_times(times)
     truth_half = problem.truth or Truth()
@@ -56,7 +61,25 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
     v = rng.standard_normal((K * len(index), M))
     states, z = propagate(problem, actual, epochs, index, first, w, v if truth_half.measurement_noise else None)
     names = np.array([s.name for s in problem.stations])[np.tile(index, K)] if len(problem.stations) > 1 else None
-    return Tracking(np.repeat(epochs, len(index)), z, names, states, problem.epoch)
+    whole = Tracking(np.repeat(epochs, len(index)), z, names, states, problem.epoch)
+    return _measured(problem, whole, seen(actual, epochs, states)[:, index]) if is_restricted(problem) else whole
+
+
+def _measured(problem: Problem, whole: Tracking, marks: Array) -> Tracking:
+    """The rows that are marked, (K, S).
+
+    Where the prior is at the first epoch, whichever that is, it stays, as rows without a value, to be the same as simulated.
+    """
+    if not marks.any():
+        said = rules(problem, range(len(problem.stations)))
+        raise ValueError(f"no station sees anything at these {len(whole.times)} times: {said}")
+    z = np.where(marks.reshape(-1, 1), whole.values, np.nan)
+    rows = marks.copy()
+    if problem.prior_time is None:
+        rows[0, :1] |= not rows[0].any()
+    kept, flat = rows.any(axis=1), rows.reshape(-1)
+    names = None if whole.row_stations is None else whole.row_stations[flat]
+    return Tracking(whole.row_times[flat], z[flat], names, whole.truth[kept], whole.epoch)
 
 
 def propagate(

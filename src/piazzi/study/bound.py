@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
-from piazzi.simulation import true_problem
+from piazzi.simulation import is_restricted, true_problem
 from piazzi.study.ensemble import Layout, filter_runs
 from piazzi.study.plan import BOUND_RUNS, Plan
 from piazzi.study.runs import Runs, simulated
@@ -80,7 +80,7 @@ class _Mean:
 
 def _add(mean: _Mean, first: int, study: Plan, actual: Problem, runs: Runs, good: list[int], view: str) -> int:
     """Add the bounds of truths to a mean; of how many: all of an ensemble, `SLOW_RUNS` in all one by one."""
-    if good and view == "realtime" and actual.runs_in_ensemble:
+    if good and view == "realtime" and actual.runs_in_ensemble and not is_restricted(actual):
         _, _, scores = filter_runs(Layout(actual, study.times), runs.z[good], runs.truth[good], at_truth=True)
         found = scores.spread.transpose(0, 2, 1)
     else:

@@ -12,6 +12,7 @@ from piazzi.estimate.estimator import views_of
 from piazzi.estimate.kalman import ExtendedKalmanFilter
 from piazzi.estimate.width import DIFFUSE, prior_ratio
 from piazzi.problem import Problem
+from piazzi.simulation import is_restricted
 from piazzi.study.bound import bound_at, no_bound
 from piazzi.study.ensemble import filter_runs, library
 from piazzi.study.plan import Plan
@@ -71,7 +72,7 @@ def _estimated(study: Plan, label: str, estimator: Any, runs: Runs) -> list[tupl
     M, G, T = len(runs.truth), len(study.groups), len(study.kept)
     found = [(empty_scores(M, G, T), list(runs.wrong)) for _ in views]
     left = [i for i in range(M) if not runs.wrong[i]]
-    if _filters_in_ensemble(estimator, runs.assumed):
+    if _filters_in_ensemble(estimator, runs.assumed) and not is_restricted(runs.world):  # an ensemble misses nothing
         left = _filter(study, runs, left, found[0][0])
     for i in left:
         for view, (scored, message) in _one(study, label, estimator, runs, i).items():

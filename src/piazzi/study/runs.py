@@ -9,7 +9,17 @@ import numpy as np
 
 from piazzi.problem import Problem, Tracking, Truth
 from piazzi.problem.checks import Array
-from piazzi.simulation import MOST_DRAWS, NoTruthError, Rule, check_finite, placed, propagate, true_problem
+from piazzi.simulation import (
+    MOST_DRAWS,
+    NoTruthError,
+    Rule,
+    check_finite,
+    is_restricted,
+    placed,
+    propagate,
+    seen,
+    true_problem,
+)
 from piazzi.study.ensemble import Layout, simulate_runs
 from piazzi.study.plan import Plan
 from piazzi.study.tasks import Task
@@ -51,6 +61,8 @@ def simulated(study: Plan, task: Task) -> Runs:
         truth, z = simulate_runs(layout, actual, draws.first, draws.w, draws.v, noisy)
     else:
         truth, z = _one_by_one(world, actual, study.times, draws, noisy)
+    if is_restricted(world):  # a run has all rows, those that are not measured without a value
+        z[~seen(actual, study.times, truth).reshape(len(truth), -1)] = np.nan
     return Runs(world, assumed, layout, assumed_layout, truth, z, _faults(world, actual, study.times, draws, truth, z))
 
 
@@ -75,7 +87,8 @@ def _faults(world: Problem, actual: Problem, times: Array, draws: Draws, truth: 
             continue
         try:
             check_finite(world, times, draws.first[i], truth[i])
-            out[i] = "the simulated measurements are not finite"
+            empty = np.isnan(z[i]).all() and is_restricted(world)
+            out[i] = "no station sees anything" if empty else "the simulated measurements are not finite"
         except ValueError as error:
             out[i] = str(error)
     return out

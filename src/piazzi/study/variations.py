@@ -126,7 +126,8 @@ def _positive(factor: float) -> float:
 
 
 def _scaled(station: Station, factor: float) -> Station:
-    return Station(station.name, station.sensor, station.noise * _positive(factor), station.numbers)
+    noise = station.noise * _positive(factor)
+    return Station(station.name, station.sensor, noise, station.numbers, schedule=station.schedule)
 
 
 def _station_change(name: str) -> Change:

@@ -10,6 +10,7 @@ from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.quantities import Display, display_of, unit_of
 from piazzi.present.figures.style import MEASURED, STATIONS, drawn, plain, shade_of, time_axis
 from piazzi.problem import Problem, Tracking, epoch_of
+from piazzi.problem import passes as find_passes
 from piazzi.problem.checks import Array
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 
 SIGMAS = 3.0
+SHORTEST = 0.002  # of the run: the shortest bar
 
 
 def component_of(problem: Problem, column: int) -> tuple[str, str]:
@@ -50,6 +52,19 @@ def measurements(ax: Axes, problem: Problem, tracking: Tracking, column: int = 0
     if show.unit == "deg" and np.nanmax(np.abs(values), initial=0.0) > np.pi / 2:
         ax.yaxis.set_major_locator(MultipleLocator(90))
     ax.set_ylabel(show.label(plain(name)))
+    return ax
+
+
+def passes(ax: Axes, problem: Problem, tracking: Tracking, gap: float | None = None) -> Axes:
+    """When each station measured: a bar for every pass, `piazzi.passes`."""
+    time, names = time_axis(ax, tracking.times, epoch_of(problem, tracking)), [s.name for s in problem.stations]
+    least = SHORTEST * float(tracking.times[-1] - tracking.times[0])
+    for found in find_passes(problem, tracking, gap):
+        s = names.index(found.station)
+        bar = (found.start * time.factor, max(found.stop - found.start, least) * time.factor)
+        ax.broken_barh([bar], (s - 0.3, 0.6), color=STATIONS[s % len(STATIONS)])
+    ax.set_yticks(range(len(names)), [plain(name) for name in names])
+    ax.set_ylim(len(names) - 0.4, -0.6)
     return ax
 
 

@@ -20,9 +20,10 @@ from piazzi.present.figures.errors import (
     state_display,
     state_error,
 )
-from piazzi.present.figures.measured import innovations, measurements
+from piazzi.present.figures.measured import innovations, measurements, passes
 from piazzi.present.figures.space import orbit, position_at, position_columns
 from piazzi.present.figures.style import MEASURED, RC, label_of, plain, symmetric_scale
+from piazzi.problem.gaps import in_passes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,6 +44,7 @@ def pages(comparison: Comparison, *, title: str = "", planet_radius: float | Non
             makers.append(("orbit", lambda: orbit_page(comparison, planet_radius)))
         makers += [
             ("measurements", lambda: measurement_page(comparison)),
+            *([("passes", lambda: pass_page(comparison))] if in_passes(comparison.problem, comparison.tracking) else []),
             ("errors", lambda: error_page(comparison)),
             ("comparison", lambda: overlay_page(comparison)),
             ("consistency", lambda: consistency_page(comparison)),
@@ -116,6 +118,13 @@ def measurement_page(comparison: Comparison) -> Figure:
     if len(comparison.problem.stations) > 1:
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=6, markerscale=4)
+    return figure
+
+
+def pass_page(comparison: Comparison) -> Figure:
+    """When each station measured."""
+    figure = _figure(10.5, 0.35 * len(comparison.problem.stations) + 1.2)
+    passes(figure.add_subplot(), comparison.problem, comparison.tracking).set_title("Passes")
     return figure
 
 

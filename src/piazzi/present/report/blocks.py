@@ -48,7 +48,9 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Values against x: a line, points, or a band of +-y about zero.  `key` is the index of its legend entry, -1 for none.
+    """Values against x: a line, points, thick spans, or a band of +-y about zero.
+
+    `key` is the index of its legend entry, -1 for none.
 
     Where `y` is a tuple of arrays, the root of their summed squares is meant.  What is drawn is `times` as large.
     """
@@ -57,7 +59,7 @@ class Line:
     y: Array | tuple[Array, ...]
     label: str
     key: int = -1
-    kind: Literal["line", "points", "band", "bars"] = "line"
+    kind: Literal["line", "points", "band", "bars", "spans"] = "line"
     times: float = 1.0
     colour: str = "#7A7A7A"
     dash: tuple[int, ...] = ()

@@ -8,7 +8,7 @@ from piazzi.evaluate import Comparison
 from piazzi.evaluate.comparison_table import columns
 from piazzi.present.figures.style import time_display
 from piazzi.present.report.blocks import CursorValues, Point, Section, Tab, Table, Text
-from piazzi.present.report.panels import consistency, group_charts, innovations, state_charts
+from piazzi.present.report.panels import consistency, group_charts, innovations, passes, state_charts
 from piazzi.present.report.paths import orbits
 from piazzi.present.report.views import Views
 from piazzi.present.report.words import points
@@ -61,6 +61,7 @@ def _sections(views: Views, planet_radius: float | None) -> list[Section]:
     paths = orbits(views, planet_radius)
     return [
         *([Section("The orbit", paths, _PLAY)] if paths else []),
+        *([Section("Passes", [sights], _PASSES)] if (sights := passes(views)) else []),
         Section(
             "Errors and their predicted standard deviations",
             [*group_charts(views), CursorValues("Values at the cursor")],
@@ -69,6 +70,9 @@ def _sections(views: Views, planet_radius: float | None) -> list[Section]:
         Section("State by state", state_charts(views), _INSIDE if known else _BANDS),
         Section("Consistency", [*innovations(views), *consistency(views)], _CONSISTENCY if known else _CONSISTENCY + _NO_NEES),
     ]
+
+
+_PASSES = "When each station measured: rows without a gap of more than 2.5 times the usual interval."
 
 
 def _table(comparison: Comparison, views: Views) -> Section:

@@ -9,12 +9,13 @@ import numpy as np
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.metrics import groups
 from piazzi.evaluate.quantities import Display, display_of, unit_of
-from piazzi.present.colours import DASHES
-from piazzi.present.figures.measured import component_of
+from piazzi.present.colours import DASHES, STATIONS
+from piazzi.present.figures.measured import SHORTEST, component_of
 from piazzi.present.report.blocks import Axis, Chart, Line
 from piazzi.present.report.views import Thinning, Views
 from piazzi.present.squares import Squares, nees_of, nis_of
 from piazzi.problem.checks import Array
+from piazzi.problem.gaps import in_passes
 
 Shown = Array | tuple[Array, ...]  # what a page is given for a line
 INK = "var(--ink)"  # the colour of letters, in light and in dark
@@ -127,6 +128,24 @@ def _about_zero(label: str, show: Display, sizes: Sequence[Array]) -> Axis:
     settled = min(float(np.median(g[len(g) // 2 :])) for g in good)
     bent = largest > _BENT * settled
     return Axis(label, show, "symmetric" if bent else "linear", -1.15 * largest, 1.15 * largest, settled if bent else 0.0)
+
+
+def passes(views: Views) -> Chart | None:
+    """When each station measured, where there are passes to tell apart."""
+    problem, tracking = views.comparison.problem, views.comparison.tracking
+    found, names = in_passes(problem, tracking), [s.name for s in problem.stations]
+    if not found:
+        return None
+    least = SHORTEST * float(tracking.times[-1] - tracking.times[0])
+    lines = []
+    for s, name in enumerate(names):
+        ends = [(one.start, max(one.stop, one.start + least)) for one in found if one.station == name]
+        x = np.array([t for start, stop in ends for t in (start, stop, stop)])
+        y = np.tile([float(s), float(s), np.nan], len(ends))
+        lines.append(Line(x, y, name, kind="spans", colour=STATIONS[s % len(STATIONS)]))
+    y_axis = Axis("station", Display(""), low=-0.6, high=len(names) - 0.4)
+    levels = [(float(s), name) for s, name in enumerate(names)]
+    return Chart("Passes", views.axis, y_axis, [line for line in lines if len(line.x)], levels=levels)
 
 
 def innovations(views: Views) -> list[Chart]:

@@ -126,6 +126,9 @@ class Chart {
       } else if (line.kind === "bars") {
         line.mark = element("path", { ...style, d: this.sticks(line), class: "bars" });
         this.inside.append(line.mark);
+      } else if (line.kind === "spans") {
+        line.mark = element("path", { ...style, d: this.path(line.x, line.y, 1), class: "bars" });
+        this.inside.append(line.mark);
       } else {
         line.mark = element("path", { ...style, d: this.path(line.x, line.y, 1), "stroke-dasharray": line.dash.join(" "), class: "line" });
         this.inside.append(line.mark);
