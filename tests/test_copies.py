@@ -60,6 +60,7 @@ def samples():
         pz.Huber(),
         pz.Tukey(),
     ]
+    settings += [pz.Schedule(every=10.0), pz.passes(problem, tracking)[0]]
     steps = [
         pz.Discrete(),
         pz.DormandPrince(),
