@@ -287,6 +287,17 @@ META_STOP
 """
 
 
+def test_axes_that_nobody_knows_are_those_that_the_user_says(data_dir):
+    path = data_dir / "ccsds/odm/opm/OPM-unknown-frame-mapper.txt"
+    told = pz.read_ephemeris(path, frame="gcrf")
+    assert (told.arcs[0].frame, told.arcs[0].covariance_frames, told.open) == ("GCRF", ("GCRF",), ())
+    assert pz.read_tracking(path, frame="GCRF").segments[0].frame == "GCRF"
+    known = data_dir / "ccsds/odm/opm/OPMExample4.txt"
+    assert pz.read_ephemeris(known, frame="GCRF").arcs[0].frame == "TOD"
+    with pytest.raises(ValueError, match="axes 'ITTF' are none of"):
+        pz.read_ephemeris(known, frame="ITTF")
+
+
 def test_names_may_have_brackets(tmp_path):
     (tmp_path / "a").write_text(OEM.replace("OBJECT_NAME = A", "OBJECT_NAME = DEBRIS [1993-036A]"))
     assert pz.read_ephemeris(tmp_path / "a").objects == ("DEBRIS [1993-036A]",)

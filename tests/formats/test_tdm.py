@@ -3,6 +3,7 @@
 import math
 import random
 
+import ccsds_ndm
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -93,6 +94,24 @@ def test_good_files_hold_what_stands_in_them(name, form, data_dir):
         assert (first.interval, first.interval_reference) == want["interval"]
     for key in ("delays", "frequencies"):
         assert getattr(first, key) == want.get(key, getattr(first, key))
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_another_reader_finds_the_same_numbers(name, data_dir):
+    path = data_dir / "ccsds/tdm/xml" / f"{name}.xml"
+    found = [one for segment in ccsds_ndm.from_file(str(path)).segments for one in segment.data.observations]
+    rows = pz.read_tracking(path)
+    assert_allclose([pz.Epoch(one.epoch, "UTC") - rows.epoch for one in found], rows.t, rtol=0, atol=1e-9)
+    factor = np.array([FACTORS.get(rows.kinds[i], 1.0) for i in rows.kind])
+    if name == "TDMExample8":
+        factor = np.where(rows.of_kind("range"), 299792458.0, factor)  # whose ranges are in seconds
+    offset = np.where(rows.of_kind("receive_frequency"), dict(rows.segments[0].frequencies).get("offset", 0.0), 0.0)
+    assert_array_equal([one.value for one in found] * factor + offset, rows.value)
+
+
+FACTORS = dict.fromkeys(["azimuth", "elevation", "x_south", "y_east"], DEGREE) | dict.fromkeys(
+    ["range", "range_rate_averaged"], 1e3
+)
 
 
 def test_segments_of_one_file_keep_their_own_conventions(data_dir):

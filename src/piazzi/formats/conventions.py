@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.earth.scales import SCALES
+from piazzi.formats.frames import KNOWN, frame_named, settled
 from piazzi.formats.kinds import ANGLES, KINDS, TAGS
 from piazzi.formats.observations import Array, Observations, Segment
 from piazzi.text import nearest, suggest
@@ -72,6 +73,8 @@ class Conventions:
         """
         chosen = {name: _word(name, words.pop(name, None)) for name in WORDS}
         frame = words.pop("frame", None)
+        if frame is not None and (frame := frame_named(str(frame))) not in KNOWN:
+            raise ValueError(f"axes {frame!r} are none of {', '.join(KNOWN)}{suggest(frame, KNOWN)}")
         scales = tuple(_scale(text) for text in _texts(time))
         sigmas = tuple(_sigma(text) for text in _texts(sigma))
         seconds = None if interval is None else float(interval)
@@ -162,16 +165,17 @@ def _completed(segment: Segment, told: Conventions) -> Segment:
     """A segment with what is said of it where it says nothing."""
     new: dict[str, Any] = {
         name: getattr(told, name)
-        for name in ("angles", "tag", "frame", "interval", "interval_reference")
+        for name in ("angles", "tag", "interval", "interval_reference")
         if getattr(segment, name) is None and getattr(told, name) is not None
     }
+    new["frame"] = settled(segment.frame, told.frame)
     if told.range is not None:
         way, range_is = RANGES[told.range]
         new |= {"way": segment.way or way, "range_is": segment.range_is or range_is}
     if told.corrections is not None:
         applied = told.corrections == "applied"
         new["corrections"] = tuple(c if c.applied is not None else c._replace(applied=applied) for c in segment.corrections)
-    return replace(segment, **new) if new else segment
+    return replace(segment, **new)
 
 
 def _tags(observations: Observations, told: Conventions) -> Array:

@@ -6,12 +6,11 @@ import re
 from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple, NoReturn
 
-from piazzi.earth import FRAMES, Epoch
+from piazzi.earth import Epoch
 from piazzi.earth.scales import SCALES
 from piazzi.formats.columns import LARGEST
 from piazzi.text import one_line, suggest
 
-_FRAME_WORDS = {"TOD_EARTH": "TOD", "MOD_EARTH": "MOD", "J2000": "EME2000", "TOD_IAU2006": "TOD", "PEF_IAU2006": "PEF"}
 _SHOWN = 60
 
 
@@ -79,15 +78,6 @@ def known(source: Source, item: Item, keywords: Collection[str], where: str) -> 
     """Refuse a keyword that does not belong there."""
     if item.keyword not in keywords:
         source.refuse(item.line, f"{shown(item.keyword)} is no keyword of {where}{suggest(item.keyword[:_SHOWN], keywords)}")
-
-
-def frame_named(text: str) -> str:
-    """The name by which `earth` knows the axes that a message names: ``ITRF-97`` is ITRF; unknown ones as they are."""
-    name = text.strip().upper().replace(" ", "")
-    name = _FRAME_WORDS.get(name, name)
-    if re.fullmatch(r"ITRF[-_]?\d{2,4}", name):
-        return "ITRF"
-    return name if name in FRAMES or name == "ICRF" else text.strip()
 
 
 def lines_of(data: bytes) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -242,10 +242,3 @@ def _chosen(column: Array, rows: Any) -> Array:
     if not is_constant(column):
         return np.asarray(column[rows])
     return np.broadcast_to(column[0], np.empty(len(column), dtype=np.bool_)[rows].shape)
-
-
-def with_segments(observations: Observations, segments: Sequence[Segment]) -> Observations:
-    """The same rows with other conventions, as many as before."""
-    if len(segments) != len(observations.segments):
-        raise ValueError(f"there are {len(observations.segments)} segments, and {len(segments)} are given")
-    return replace(observations, segments=tuple(segments))

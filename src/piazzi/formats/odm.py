@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from piazzi.earth import FRAMES, Epoch
+from piazzi.earth import Epoch
 from piazzi.earth.scales import UTC_BEGINS
 from piazzi.formats.dates import instants, read_dates
 from piazzi.formats.ephemeris import Arc
-from piazzi.formats.ndm import Item, Source, frame_named, known, needed, shown, single
-from piazzi.formats.odm_keywords import COVARIANCE, LOCAL, OEM_META, SPACECRAFT, STATE
+from piazzi.formats.frames import KNOWN, frame_named
+from piazzi.formats.ndm import Item, Source, known, needed, shown, single
+from piazzi.formats.odm_keywords import COVARIANCE, OEM_META, SPACECRAFT, STATE
 from piazzi.units import Units
 
 Array = np.ndarray[Any, Any]
@@ -142,7 +143,7 @@ def _covariances(source: Source, blocks: Sequence[Block], epoch: Epoch, scale: s
 
 def unknown_axes(names: Sequence[str | None]) -> tuple[str, ...]:
     """What is open about axes that nobody knows by their name."""
-    odd = sorted({name for name in names if name and name not in (*FRAMES, *LOCAL, "ICRF")})
+    odd = sorted({name for name in names if name and name not in KNOWN})
     return tuple(f"axes {name} have no meaning here: --frame names those that they are" for name in odd)
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.ephemeris import Arc, Burn, Ephemeris, MeanElements
-from piazzi.formats.ndm import Item, Source, frame_named, key_value, known, lines_of, needed, single
+from piazzi.formats.frames import frame_named
+from piazzi.formats.ndm import Item, Source, key_value, known, lines_of, needed, single
 from piazzi.formats.odm import about, covariance_of, in_si, spacecraft_of, unknown_axes
 from piazzi.formats.odm_keywords import ELEMENTS, MANOEUVRE, OMM, OPM, STATE
 from piazzi.formats.oem import check_version

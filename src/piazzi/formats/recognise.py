@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from importlib import import_module
 from typing import Any, NamedTuple
 
 from piazzi.formats.conventions import Conventions, with_conventions
 from piazzi.formats.ephemeris import Ephemeris
+from piazzi.formats.frames import settled
 from piazzi.formats.observations import Observations
 from piazzi.formats.source import read_bytes
 
@@ -118,8 +120,15 @@ def read_ephemeris(path: str | os.PathLike[str], **conventions: Any) -> Ephemeri
     data, form, name = _opened(path)
     if form.ephemeris is None:
         raise ValueError(f"{name}: the file holds measurements, no orbit; read_tracking reads it")
-    found: Ephemeris = _reader(form.ephemeris)(data, name, Conventions.of(**conventions))
-    return found
+    told = Conventions.of(**conventions)
+    found: Ephemeris = _reader(form.ephemeris)(data, name, told)
+    if told.frame is None:
+        return found
+    arcs = []
+    for arc in found.arcs:
+        own = tuple(str(settled(frame, told.frame)) for frame in arc.covariance_frames)
+        arcs.append(replace(arc, frame=settled(arc.frame, told.frame), covariance_frames=own))
+    return replace(found, arcs=tuple(arcs), open=tuple(text for text in found.open if "--frame" not in text))
 
 
 def _opened(path: str | os.PathLike[str]) -> tuple[bytes, Format, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from piazzi.formats.frames import KNOWN
 from piazzi.formats.kinds import KINDS
 from piazzi.formats.observations import Segment
 
@@ -32,7 +33,7 @@ def open_of(segments: Sequence[Segment], present: Mapping[str, int]) -> tuple[st
         out.append("over which interval range rates are averaged: --interval 60 and --interval-reference middle")
     if "right_ascension" in kinds:
         out.append("what directions are reduced to: --angles astrometric, --angles geocentric or --angles apparent")
-        if any(segment.frame is None for segment in segments):
+        if any(segment.frame not in KNOWN for segment in segments):
             out.append("the axes of right ascension and declination: --frame EME2000")
     if any(c.applied is None for segment in segments for c in segment.corrections):
         out.append("whether the corrections are applied: --corrections applied or --corrections open")

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from piazzi.formats.conventions import Conventions
-from piazzi.formats.ndm import Item, Source, frame_named, known, needed, numbered, shown, single
+from piazzi.formats.frames import frame_named
+from piazzi.formats.ndm import Item, Source, known, needed, numbered, shown, single
 from piazzi.formats.observations import Correction, Segment
 from piazzi.formats.tdm_keywords import (
     ANGLE_KINDS,
