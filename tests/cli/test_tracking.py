@@ -62,6 +62,10 @@ def test_pictures_and_conversions_are_written(call, tdm, tmp_path, data_dir):
     ephemeris = data_dir / "ccsds/odm/oem/OEMExample3.txt"
     assert call("tracking", ephemeris, "--to", tmp_path / "d.oem").status == 0
     assert len(pz.read_ephemeris(tmp_path / "d.oem").arcs) == 3
+    assert "write an .oem" in call("tracking", ephemeris, "--to", tmp_path / "e.opm").refused()
+    assert call("tracking", data_dir / "ccsds/odm/opm/OPMExample1.txt", "--to", tmp_path / "f.opm").status == 0
+    assert call("tracking", data_dir / "ccsds/odm/oem/OEMExample5.txt", "--to", tmp_path / "g.ocm").status == 0
+    assert "TRAJ_TYPE = CARTPV" in (tmp_path / "g.ocm").read_text()
 
 
 @pytest.mark.parametrize("name", ["ilrs/lageos2_201802.npt.v2C", "ccsds/odm/oem/OEMExample5.txt", "tdm/TDMExample15.xml"])
@@ -73,7 +77,7 @@ def test_every_format_is_shown(call, data_dir, name):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--to", "a.xyz"], "must end in .tdm, .csv, .oem"),
+        (["--to", "a.xyz"], "must end in .tdm, .csv, .oem, .opm, .ocm"),
         (["-o", "a.txt"], "must end in .png, .pdf, .svg"),
         (["--to", "no/such/folder/a.csv"], "there is no folder"),
         (["--to", "a.oem"], "the file holds measurements, no orbit"),

@@ -12,6 +12,7 @@ from oem import OrbitEphemerisMessage
 import piazzi as pz
 from piazzi.formats import Observations, Segment
 from piazzi.formats.dates import instants, read_dates
+from piazzi.formats.write_ocm import ocm_text
 from piazzi.formats.write_odm import oem_text, omm_text, opm_text
 from piazzi.formats.write_tdm import tdm_text
 from piazzi.formats.writing import dates, in_unit
@@ -200,3 +201,33 @@ def test_a_reader_in_python_takes_what_is_written(name, data_dir, tmp_path):
         blocks = [block.matrix for block in segment.covariances]
         assert len(blocks) == len(arc.covariance_frames)
         assert_allclose(np.reshape(blocks, (-1, 6, 6)), arc.covariance / 1e6, rtol=1e-15)
+
+
+def test_a_comprehensive_message_is_read_by_another_reader(data_dir):
+    arc = pz.read_ephemeris(data_dir / "ccsds/odm/oem/OEMExample3.txt").arcs[2]
+    arc = replace(arc, frame="GCRF", centre="EARTH", spacecraft=(("mass", 1000.0), ("drag_area", 2.0)))
+    told = {
+        "OD_ID": "1", "OD_METHOD": "BWLS", "OD_EPOCH": "1996-12-28T22:00:02", "OBS_AVAILABLE": 300, "OBS_USED": 290,
+        "ACTUAL_OD_SPAN": 3.5, "WEIGHTED_RMS": 0.98, "SENSORS": "7090, 7105",
+    }  # fmt: skip
+    text = ocm_text(arc, determination=told, created=MADE)
+    found = ccsds_ndm.from_str(text).segment.data
+    (trajectory,) = found.traj
+    assert [line.values for line in trajectory.traj_lines] == in_unit(np.hstack([arc.position, arc.velocity]), 1e3).tolist()
+    assert [block.cov_ref_frame for block in found.cov] == ["RTN", "EME2000"]
+    lower = in_unit(arc.covariance, 1e6)[:, *np.tril_indices(6)]
+    assert_array_equal([line.values for block in found.cov for line in block.cov_lines], lower)
+    assert (found.od.obs_used, found.od.weighted_rms) == (290, 0.98)
+    assert found.phys.wet_mass == 1000.0
+
+
+@pytest.mark.parametrize(
+    ("told", "says"),
+    [({"OD_EPOC": 1}, "did you mean 'OD_EPOCH'"), ({"OD_ID": 1, "OD_METHOD": "x"}, "needs OD_EPOCH")],
+)
+def test_a_determination_has_the_keywords_of_the_standard(data_dir, told, says):
+    arc = pz.read_ephemeris(data_dir / "ccsds/odm/oem/OEMExample5.txt").arcs[0]
+    with pytest.raises(ValueError, match=says):
+        ocm_text(arc, determination=told)
+    with pytest.raises(ValueError, match="the axes of ISS must be known"):
+        ocm_text(replace(arc, frame=None))

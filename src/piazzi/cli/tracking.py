@@ -15,13 +15,14 @@ if TYPE_CHECKING:
     from piazzi.formats import Observations
 
 PICTURES = (".png", ".pdf", ".svg")
-TARGETS = (".tdm", ".csv", ".oem")
+ORBITS = (".oem", ".opm", ".ocm")
+TARGETS = (".tdm", ".csv", *ORBITS)
 
 
 @click.command(cls=options.Command)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True)
 @options.output("Draw when what was measured, as .png, .pdf or .svg.")
-@click.option("--to", "target", metavar="FILE", help="Convert, to a .tdm or .csv, or an ephemeris to .oem.")
+@click.option("--to", "target", metavar="FILE", help="Convert, to .tdm or .csv; orbits to .oem, .opm or .ocm.")
 @options.as_json
 @conventions
 def command(files: tuple[str, ...], output_file: str | None, target: str | None, as_json: bool, **answers: Any) -> int:
@@ -66,13 +67,13 @@ def _check_target(target: str | None, files: tuple[str, ...]) -> None:
     ending = Path(target).suffix.lower()
     if ending not in TARGETS:
         raise click.BadParameter(f"{target!r} must end in {', '.join(TARGETS)}", param_hint="--to")
-    if ending == ".oem" and len(files) > 1:
-        raise click.BadParameter("an .oem is made of one file", param_hint="--to")
+    if ending in ORBITS and len(files) > 1:
+        raise click.BadParameter(f"an {ending} is made of one file", param_hint="--to")
     output.check_place(target)
 
 
 def _write(target: str, file: str, rows: Observations) -> None:
-    """Write rows, or the ephemeris of a file, by the ending of the target."""
+    """Write rows, or the orbit of a file, by the ending of the target."""
     from piazzi.io.atomic import atomic_path
 
     ending = Path(target).suffix.lower()
@@ -85,12 +86,23 @@ def _write(target: str, file: str, rows: Observations) -> None:
 
         text = csv_text(rows)
     else:
-        from piazzi.formats import read_ephemeris
-        from piazzi.formats.write_odm import oem_text
-
-        text = oem_text(read_ephemeris(file))
+        text = _orbit_text(file, ending)
     with atomic_path(target) as work:
         work.write_text(text, encoding="utf-8")
+
+
+def _orbit_text(file: str, ending: str) -> str:
+    """The message of an ephemeris; raises ValueError where it does not fit into that kind."""
+    from piazzi.formats import read_ephemeris
+    from piazzi.formats.write_ocm import ocm_text
+    from piazzi.formats.write_odm import oem_text, opm_text
+
+    found = read_ephemeris(file)
+    if ending == ".oem":
+        return oem_text(found)
+    if len(found.arcs) != 1:
+        raise ValueError(f"{file}: an {ending} holds one arc, and there are {len(found.arcs)}: write an .oem")
+    return opm_text(found.arcs[0]) if ending == ".opm" else ocm_text(found.arcs[0])
 
 
 def _draw(path: str, rows: Observations) -> str:
