@@ -30,7 +30,8 @@ class ShootingSolver(BorderedSolver):
 
     def __init__(self, chain: Chain) -> None:
         super().__init__(chain)
-        i, self.x = chain.inputs, np.empty_like(chain.x)
+        i = chain.inputs
+        self.x: Array = np.empty_like(chain.x)
         library = kernels.load(chain.problem.spec("transition", "propagate"))
         self._propagate: Callable[[], None] = library.run_propagation.bind(
             i.epochs, i.t, i.count, chain.problem.given_bundle, self.x

@@ -20,9 +20,6 @@ from piazzi.problem.inputs import Inputs
 MEASUREMENT, DYNAMICS, PRIOR, DEFECT, GRADIENT, FIT, STEP, STEP_SMOOTHED, WIDEST = range(9)
 
 
-NO_LOSS = np.zeros(1)
-
-
 def report_of(figures: Array) -> bundle.Report:
     """Figures (9,) as kernels write them."""
     return bundle.Report(**{name: figures[i : i + 1] for i, name in enumerate(bundle.Report.slots)})
@@ -86,45 +83,27 @@ class Chain:
             problem.spec(*chain_fragments(problem, *graph_fragments(problem)), lanes=lanes_for(problem.model.n))
         )
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
-        J = len(inputs.z)
-        self.x, self.f, self.Phi = np.empty((K, N)), np.empty((K, N)), np.empty((K, N, N))
-        self.Q_all = np.empty((K if problem.noise_varies else 1, N, N))
-        self.nu, self.H = np.empty((J, M)), np.zeros((J, M, N))  # no row of H is made for what a sensor does not have
-        self.d_pred, self.P_pred = np.empty((K, N)), np.empty((K, N, N))
-        self.multiplier, self.dx = np.zeros((K, N)), np.empty((K, N))
-        self.gains, self.scaling = np.empty((inputs.most_rows * M + N, N + 1)), scaling_of(problem)
+        J, A, varies = len(inputs.z), inputs.most_rows * M + N, problem.noise_varies
+        self.linear = bundle.Chain.empty(X=K, C=K, N=N, L=K if varies else 1, B=J, M=M, A=A)
+        self.x, self.f, self.Phi, self.Q_all, self.nu, self.H, self.d_pred, self.P_pred, *others = self.linear.members
+        _, self.multiplier, self.dx, self.scaling, *_ = others
+        self.H.fill(0.0)  # no row of H is made for what a sensor does not have
+        self.multiplier.fill(0.0)
+        self.scaling[:] = scaling_of(problem)
         self.broken, self.report = np.zeros((K, N)), np.zeros(9)
         self.run, p, measured, self.prior = inputs.bundles(problem)
-        self.linear, self.figures = self._bundle(self.Q_all), report_of(self.report)
+        self.figures = report_of(self.report)
         self._linearize: Callable[[], None] = self.library.graph_linearize.bind(
             self.run, p, measured, self.prior, self.linear, self.broken, self.figures
         )
-        if problem.noise_varies:
+        if varies:
             self._bind_weigh()
-
-    def _bundle(self, Q_all: Array) -> bundle.Chain:
-        """The arrays for kernels, with this process noise of each step."""
-        return bundle.Chain(
-            x=self.x,
-            f=self.f,
-            Phi=self.Phi,
-            Q_all=Q_all,
-            nu=self.nu,
-            H=self.H,
-            d_pred=self.d_pred,
-            P_pred=self.P_pred,
-            gains=self.gains,
-            multiplier=self.multiplier,
-            dx=self.dx,
-            scaling=self.scaling,
-            loss=NO_LOSS,
-            weights=NO_LOSS,
-        )
 
     def _bind_weigh(self) -> None:
         """What judges a step by the process noise that it was solved with, where that depends on the states."""
         self.Q_before, self.broken_now, self._weighed = np.empty_like(self.Q_all), np.zeros_like(self.x), np.zeros(9)
-        solved = self._bundle(self.Q_before)
+        members = dict(zip(self.linear.slots, self.linear.members, strict=True))
+        solved = bundle.Chain(**members | {"Q_all": self.Q_before})
         self._weigh: Callable[[], None] = self.library.graph_weigh.bind(
             self.run, solved, self.broken_now, report_of(self._weighed)
         )
@@ -132,7 +111,12 @@ class Chain:
     def linearize(self) -> float:
         """Linearise about `x`; the cost there, half the sum of squares."""
         self._linearize()
-        return 0.5 * float(self.report[: PRIOR + 1].sum())
+        return self.cost()
+
+    def cost(self) -> float:
+        """Half the sum of squares of the last linearisation."""
+        measured, moved, prior = self.report[: PRIOR + 1].tolist()
+        return float(0.5 * (measured + moved + prior))
 
     def keep_noise(self) -> None:
         """Remember the process noise of the present linearisation for `as_solved`."""
@@ -143,7 +127,7 @@ class Chain:
         """Cost, and defects without noise, of the present states under the process noise that was kept."""
         report = self.report
         if not self.problem.noise_varies:
-            return 0.5 * float(report[: PRIOR + 1].sum()), self.broken
+            return self.cost(), self.broken
         self._weigh()
         return 0.5 * float(report[MEASUREMENT] + report[PRIOR] + self._weighed[DYNAMICS]), self.broken_now
 
@@ -237,6 +221,7 @@ class CovarianceSolver:
         self.kernels = kernels.load(solve_spec(model.n, model.width, chain.problem.noise_varies))
         self.P_last = np.empty((model.n, model.n))
         self._solve = chain.run, chain.prior, chain.linear, self.P_last, chain.figures
+        self._undamped: Callable[[], None] = self.kernels.graph_solve.bind(*self._solve, 0.0)
 
     def begin(self, states: Array) -> Array:
         return states
@@ -250,7 +235,10 @@ class CovarianceSolver:
         return float(c.report[WIDEST])
 
     def solve(self, damping: float) -> None:
-        self.kernels.graph_solve(*self._solve, float(damping))
+        if damping > 0.0:
+            self.kernels.graph_solve(*self._solve, float(damping))
+        else:
+            self._undamped()
 
     def of_constants(self) -> Array:
         c = slice(len(self.chain.problem.model.moving), None)

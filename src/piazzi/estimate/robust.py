@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from piazzi.estimate.chain import MEASUREMENT, PRIOR, Chain, Solver
+from piazzi.estimate.chain import MEASUREMENT, Chain, Solver
 from piazzi.estimate.gauss_newton import Outcome, optimize
 from piazzi.estimate.guarded import Guard, guarded_run
 from piazzi.estimate.kalman import update_fragments
@@ -55,7 +55,7 @@ class RobustChain(Chain):
         root = np.sqrt(self.weights)
         self.nu *= root[:, None]
         self.H *= root[:, None, None]
-        return 0.5 * float(self.report[: PRIOR + 1].sum())
+        return self.cost()
 
     @property
     def mostly_rejects(self) -> bool:

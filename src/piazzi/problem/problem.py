@@ -324,7 +324,7 @@ class Problem:
         """Whether noise is integrated along each step: where there is none, there is nothing to integrate."""
         return self.process_noise.is_integral and bool(self.process_noise.covariance.any())
 
-    @property
+    @cached_property
     def noise_varies(self) -> bool:
         """Whether the noise of an interval depends on the states, so that it is not a multiple of one matrix."""
         moved = self.process_noise.axes != "states" and bool(self.process_noise.covariance.any())
