@@ -50,11 +50,18 @@ def _in_columns(pattern: bytes) -> Callable[[bytes], bool]:
     return lambda head: compiled.match(head) is not None
 
 
+_PLAIN = _begins(rb"(?:#[^\n]*\n\s*)*[0-3]\s+\S+\s+\S+\s+[12]\d{3}\s+\d+\s+\d+\s+\d+\s+\d+\s+\d+\.\d*\s")
+
 FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "SP3": Format(_begins(rb"#[a-d][PV ]"), ephemeris="sp3:read"),
     "CPF": Format(_begins(_REMARKS + rb"[Hh]1\s+[Cc][Pp][Ff]\s"), ephemeris="cpf:read"),
     "CRD": Format(_begins(_REMARKS + rb"[Hh]1\s"), tracking="crd:read"),
     "MPC": Format(_in_columns(rb"[^\n]{14}[^\n]\d{4} [ \d]\d [ \d]\d[^\n]{54}\S"), tracking="mpc:read"),
+    "B3": Format(_in_columns(rb"[A-Z][ \d]{5}[ \w]{3}\d{14}[^\n]{51}\d[^\n]*"), tracking="b3:read"),
+    "IOD": Format(_in_columns(rb"[ \d]{5} [ \d]{2} [ \d]{3}[A-Z ]{3} \d{4} [A-Z] \d{8}[^\n]*"), tracking="visual:read_iod"),
+    "UK": Format(_in_columns(rb"\d{5}\w{2}\d{10}[ \d]{15}[ \d][1-9][ \d]{8}[^\n]*"), tracking="visual:read_uk"),
+    "RDE": Format(_in_columns(rb"\d{4} \d{4} \d\.\d{3} [ \d]{4}[ \r]*\n\d\d?"), tracking="visual:read_rde"),
+    "plain columns": Format(_PLAIN, tracking="plain:read"),
     "ADES": Format(_begins(rb"(?:[#!][^\n]*\n)*[^\n|]*\|(?:[^\n]*\|)?\s*obsTime\s*[|\n]"), tracking="ades:read_psv"),
     "ADES XML": Format(_root(rb"ades"), tracking="ades:read_xml"),
     "TDM": Format(_begins(rb"CCSDS_TDM_VERS\s*="), tracking="tdm:read_kvn"),
