@@ -87,7 +87,7 @@ def _parsed(letters: Array, ordinal: bool) -> tuple[Array, Array, Array, Array]:
     bad = np.zeros(len(letters), dtype=np.bool_)
     for column in range(clock + 8):
         if column in fixed:
-            bad |= ~np.isin(letters[:, column], [ord(c) for c in fixed[column]])
+            bad |= np.all([letters[:, column] != ord(c) for c in fixed[column]], axis=0)
         else:
             bad |= (digits[:, column] < 0) | (digits[:, column] > 9)
     hour, minute, second = (_two(digits, clock + shift) for shift in (0, 3, 6))

@@ -61,7 +61,8 @@ def _moved(index: Array, names: tuple[str, ...], new: tuple[str, ...]) -> Array:
     """Indices into `names` as indices into `new`; -1 stays."""
     if new[: len(names)] == names:
         return index
-    table = np.array([*(new.index(name) for name in names), -1], dtype=index.dtype)
+    places = {name: i for i, name in enumerate(new)}
+    table = np.array([*(places[name] for name in names), -1], dtype=index.dtype)
     return np.broadcast_to(table[index[0]], index.shape) if is_constant(index) else np.asarray(table[index])
 
 

@@ -14,7 +14,7 @@ from piazzi.formats.dates import instants, read_dates
 from piazzi.formats.ephemeris import Arc
 from piazzi.formats.frames import KNOWN, frame_named
 from piazzi.formats.ndm import Item, Source, known, needed, shown, single
-from piazzi.formats.odm_keywords import COVARIANCE, OEM_META, SPACECRAFT, STATE
+from piazzi.formats.odm_keywords import COVARIANCE, OEM_META, SPACECRAFT
 from piazzi.units import Units
 
 Array = np.ndarray[Any, Any]
@@ -147,12 +147,8 @@ def unknown_axes(names: Sequence[str | None]) -> tuple[str, ...]:
     return tuple(f"axes {name} have no meaning here: --frame names those that they are" for name in odd)
 
 
-def one_system(source: Source, items: Sequence[Item]) -> None:
+def one_system(source: Source, first: Item, item: Item) -> None:
     """Refuse a message whose segments have different time systems."""
-    for item in items[1:]:
-        if item.text.upper() != items[0].text.upper():
-            before = f"{items[0].text} in line {items[0].line}"
-            source.refuse(item.line, f"TIME_SYSTEM is {shown(item.text)}, and {before}: a message has one time system")
-
-
-assert len(COVARIANCE) == 21 and len(STATE) == 6
+    if item.text.upper() != first.text.upper():
+        before = f"{first.text} in line {first.line}"
+        source.refuse(item.line, f"TIME_SYSTEM is {shown(item.text)}, and {before}: a message has one time system")

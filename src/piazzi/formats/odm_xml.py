@@ -129,7 +129,7 @@ class _Document:
         elif name == "metadata":
             self.metadata = metadata_of(self.source, self.found, line)
             self.systems.append(self.metadata["TIME_SYSTEM"])
-            one_system(self.source, self.systems)
+            one_system(self.source, self.systems[0], self.systems[-1])
         elif name == "stateVector":
             self.states.append(self.state(line))
         elif name == "covarianceMatrix":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,7 +33,8 @@ def read_kvn(data: bytes, name: str, told: Conventions) -> Ephemeris:
     data = data if b"\r" not in data else data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     marks = [(found[1], found.start(), min(found.end() + 1, len(data))) for found in _MARK.finditer(data)]
     end = marks[0][1] if marks else len(data)
-    header = _items(source, data[:end], 1)
+    text = _Text(data, np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n")))
+    header = _items(source, *text.part(0, end))
     for item in header:
         known(source, item, (*HEADER, "CCSDS_OEM_VERS"), "the header of an OEM")
     check_version(source, header[0])
@@ -43,10 +44,10 @@ def read_kvn(data: bytes, name: str, told: Conventions) -> Ephemeris:
     systems: list[Item] = []
     i = 0
     while i < len(marks):
-        i, arc, system = _segment(source, data, marks, i)
+        i, arc, system = _segment(source, text, marks, i)
         arcs.append(arc)
         systems.append(system)
-        one_system(source, systems)
+        one_system(source, systems[0], system)
     return ephemeris_of(name, arcs, header)
 
 
@@ -66,36 +67,46 @@ def check_version(source: Source, item: Item) -> None:
         source.refuse(item.line, f"the version of the message is {shown(item.text)}; 1.0, 2.0 and 3.0 are read")
 
 
+class _Text(NamedTuple):
+    """A message with the places where its lines end."""
+
+    data: bytes
+    newlines: Array
+
+    def line(self, at: int) -> int:
+        """Number of the line that a place is in."""
+        return int(np.searchsorted(self.newlines, at)) + 1
+
+    def part(self, start: int, end: int) -> tuple[bytes, int]:
+        """What stands between two places, and the line where it begins."""
+        return self.data[start:end], self.line(start)
+
+
 def _items(source: Source, data: bytes, line: int) -> list[Item]:
     return [item for k, text in enumerate(lines_of(data)) if (item := key_value(source, text, line + k)) is not None]
 
 
-def _line(data: bytes, at: int) -> int:
-    return data.count(b"\n", 0, at) + 1
-
-
-def _segment(source: Source, data: bytes, marks: list[tuple[bytes, int, int]], i: int) -> tuple[int, Arc, Item]:
+def _segment(source: Source, text: _Text, marks: list[tuple[bytes, int, int]], i: int) -> tuple[int, Arc, Item]:
     """One segment, whose mark of beginning is the i-th; returns the place of the next one's."""
     word, at, after = marks[i]
     if word != b"META_START":
-        source.refuse(_line(data, at), f"{word.decode()} stands where META_START should")
+        source.refuse(text.line(at), f"{word.decode()} stands where META_START should")
     if i + 1 >= len(marks) or marks[i + 1][0] != b"META_STOP":
-        source.refuse(_line(data, at), "the metadata of a segment do not end with META_STOP")
+        source.refuse(text.line(at), "the metadata of a segment do not end with META_STOP")
     stop = marks[i + 1]
-    found = metadata_of(source, _items(source, data[after : stop[1]], _line(data, after)), _line(data, stop[1]))
+    found = metadata_of(source, _items(source, *text.part(after, stop[1])), text.line(stop[1]))
     i += 2
-    end = marks[i][1] if i < len(marks) else len(data)
-    dates, numbers, lines = _states(source, data, stop[2], end)
+    end = marks[i][1] if i < len(marks) else len(text.data)
+    dates, numbers, lines = _states(source, text, stop[2], end)
     blocks: list[Block] = []
     while i < len(marks) and marks[i][0] == b"COVARIANCE_START":
         if i + 1 >= len(marks) or marks[i + 1][0] != b"COVARIANCE_STOP":
-            source.refuse(_line(data, marks[i][1]), "the covariances of a segment do not end with COVARIANCE_STOP")
-        blocks += _blocks(source, data[marks[i][2] : marks[i + 1][1]], _line(data, marks[i][2]))
-        rest = data[marks[i + 1][2] : marks[i + 2][1] if i + 2 < len(marks) else len(data)]
-        _nothing(source, rest, _line(data, marks[i + 1][2]))
+            source.refuse(text.line(marks[i][1]), "the covariances of a segment do not end with COVARIANCE_STOP")
+        blocks += _blocks(source, *text.part(marks[i][2], marks[i + 1][1]))
+        _nothing(source, *text.part(marks[i + 1][2], marks[i + 2][1] if i + 2 < len(marks) else len(text.data)))
         i += 2
     if not len(dates):
-        source.refuse(_line(data, stop[1]), "the segment has no states")
+        source.refuse(text.line(stop[1]), "the segment has no states")
     return i, arc_of(source, found, dates, numbers, lines, blocks), found["TIME_SYSTEM"]
 
 
@@ -106,10 +117,10 @@ def _nothing(source: Source, data: bytes, line: int) -> None:
             source.refuse(line + k, f"{shown(text.strip())} stands behind the covariances of a segment")
 
 
-def _states(source: Source, data: bytes, start: int, end: int) -> tuple[Array, Array, Array]:
+def _states(source: Source, text: _Text, start: int, end: int) -> tuple[Array, Array, Array]:
     """Dates, numbers (K, 9) and lines of states."""
     dates, numbers, lines = [np.zeros(0, dtype="S1")], [np.zeros((0, 9))], [np.zeros(0, dtype=np.int64)]
-    for chunk in chunks(data, start, end, _line(data, start)):
+    for chunk in chunks(text.data, start, end, text.line(start)):
         counts = np.diff(chunk.words_before)
         rows = np.flatnonzero(counts)
         words = chunk.words(chunk.words_before[rows])

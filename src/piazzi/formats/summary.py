@@ -79,9 +79,8 @@ def passes(rows: Observations) -> Iterator[dict[str, Any]]:
     """
     found: list[tuple[float, dict[str, Any]]] = []
     pairs = rows.station.astype(np.int64) * (len(rows.participants) + 2) + rows.object
-    for pair in np.unique(pairs):
-        own = np.flatnonzero(pairs == pair)
-        own = own[np.argsort(rows.t[own], kind="stable")]
+    order = np.lexsort([rows.t, pairs])
+    for own in np.split(order, np.flatnonzero(np.diff(pairs[order])) + 1) if len(rows) else []:
         steps = np.diff(rows.t[own])
         usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
         cuts = np.flatnonzero(steps > max(LEAST_GAP, LONG * usual)) + 1

@@ -46,9 +46,10 @@ def _groups(observations: Observations) -> Iterator[Array]:
     """Indices of rows that go into one segment, those segments in the order in which their first rows come."""
     keys = np.stack([observations.segment, observations.station, observations.object], axis=1)
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    group = group.reshape(-1)
+    order = np.argsort(group.reshape(-1), kind="stable")
+    groups = np.split(order, np.cumsum(np.bincount(group.reshape(-1)))[:-1])
     for g in np.argsort(first):
-        own = np.flatnonzero(group == g)
+        own = groups[g]
         part = _parts([observations.kinds[i] for i in np.unique(observations.kind[own])], observations.kinds)
         parts = part[observations.kind[own]]
         for p in np.unique(parts):
