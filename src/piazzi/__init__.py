@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from piazzi import earth, orbit
+    from piazzi import earth, formats, orbit
     from piazzi.earth import Epoch
     from piazzi.estimate.bank import Bank
     from piazzi.estimate.batch import BatchLeastSquares
@@ -105,7 +105,7 @@ _WHERE = {
         "piazzi.evaluate.window_trade": "WindowTrade",
         "piazzi.study": "Study read_store",
         "piazzi.present.report": "write_report",
-        "": "earth orbit",
+        "": "earth formats orbit",
     }.items()
     for name in names.split()
 }
@@ -118,9 +118,9 @@ __all__ = [
     "Midpoint", "Model", "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise",
     "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother",
     "SquareRootKalmanFilter", "Station", "Study", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter",
-    "Updated", "WindowTrade", "choose_substeps", "compare", "earth", "kepler_transition", "load", "observability", "orbit",
-    "passes", "predict", "propagate_kepler", "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning",
-    "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
+    "Updated", "WindowTrade", "choose_substeps", "compare", "earth", "formats", "kepler_transition", "load",
+    "observability", "orbit", "passes", "predict", "propagate_kepler", "read_ephemeris", "read_store", "read_tracking",
+    "simulate", "step_warning", "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip
 
 

@@ -40,7 +40,7 @@ def command(files: tuple[str, ...], output_file: str | None, target: str | None,
     output.check_output(output_file, PICTURES)
     _check_target(target, files)
     from piazzi.formats import read_tracking
-    from piazzi.formats.summary import summary
+    from piazzi.formats.contents import summary
 
     rows = read_tracking(*files, **told(answers))
     wrote = []
