@@ -1,6 +1,7 @@
 """Orbits of single bodies: elements, axes and covariances, two-body motion, and orbits from a few observations."""
 
 from piazzi.orbit.axes import covariance_root, orbit_axes, state_axes, transform_covariance, transform_root
+from piazzi.orbit.difference import Difference, difference
 from piazzi.orbit.double_r import double_r
 from piazzi.orbit.equinoctial import Equinoctial, ModifiedEquinoctial
 from piazzi.orbit.from_directions import gauss, laplace
@@ -14,8 +15,8 @@ from piazzi.orbit.mean_elements import read_tle, sgp4_covariance, sgp4_states
 from piazzi.orbit.two_body import kepler_transition, propagate_kepler
 
 __all__ = [
-    "Equinoctial", "InitialOrbit", "Keplerian", "ModifiedEquinoctial", "Transfer", "covariance_root", "direction",
-    "direction_rate", "double_r", "gauss", "gibbs", "gooding", "herrick_gibbs", "kepler_transition", "lambert",
-    "lambert_all", "laplace", "orbit_axes", "propagate_kepler", "range_to_state", "read_tle", "sgp4_covariance",
-    "sgp4_states", "state_axes", "three_ranges", "transform_covariance", "transform_root",
+    "Difference", "Equinoctial", "InitialOrbit", "Keplerian", "ModifiedEquinoctial", "Transfer", "covariance_root",
+    "difference", "direction", "direction_rate", "double_r", "gauss", "gibbs", "gooding", "herrick_gibbs",
+    "kepler_transition", "lambert", "lambert_all", "laplace", "orbit_axes", "propagate_kepler", "range_to_state", "read_tle",
+    "sgp4_covariance", "sgp4_states", "state_axes", "three_ranges", "transform_covariance", "transform_root",
 ]  # fmt: skip
