@@ -4,6 +4,7 @@ from piazzi.orbit.axes import covariance_root, orbit_axes, state_axes, transform
 from piazzi.orbit.difference import Difference, difference
 from piazzi.orbit.double_r import double_r
 from piazzi.orbit.equinoctial import Equinoctial, ModifiedEquinoctial
+from piazzi.orbit.fit_mean import MeanFit, fit_sgp4
 from piazzi.orbit.from_directions import gauss, laplace
 from piazzi.orbit.from_positions import gibbs, herrick_gibbs
 from piazzi.orbit.from_ranges import direction, direction_rate, range_to_state, three_ranges
@@ -15,8 +16,8 @@ from piazzi.orbit.mean_elements import read_tle, sgp4_covariance, sgp4_states
 from piazzi.orbit.two_body import kepler_transition, propagate_kepler
 
 __all__ = [
-    "Difference", "Equinoctial", "InitialOrbit", "Keplerian", "ModifiedEquinoctial", "Transfer", "covariance_root",
-    "difference", "direction", "direction_rate", "double_r", "gauss", "gibbs", "gooding", "herrick_gibbs",
+    "Difference", "Equinoctial", "InitialOrbit", "Keplerian", "MeanFit", "ModifiedEquinoctial", "Transfer", "covariance_root",
+    "difference", "direction", "direction_rate", "double_r", "fit_sgp4", "gauss", "gibbs", "gooding", "herrick_gibbs",
     "kepler_transition", "lambert", "lambert_all", "laplace", "orbit_axes", "propagate_kepler", "range_to_state", "read_tle",
     "sgp4_covariance", "sgp4_states", "state_axes", "three_ranges", "transform_covariance", "transform_root",
 ]  # fmt: skip
