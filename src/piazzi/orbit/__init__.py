@@ -13,11 +13,12 @@ from piazzi.orbit.initial import InitialOrbit
 from piazzi.orbit.keplerian import Keplerian
 from piazzi.orbit.lambert import Transfer, lambert, lambert_all
 from piazzi.orbit.mean_elements import read_tle, sgp4_covariance, sgp4_states
+from piazzi.orbit.radar import radar
 from piazzi.orbit.two_body import kepler_transition, propagate_kepler
 
 __all__ = [
     "Difference", "Equinoctial", "InitialOrbit", "Keplerian", "MeanFit", "ModifiedEquinoctial", "Transfer", "covariance_root",
     "difference", "direction", "direction_rate", "double_r", "fit_sgp4", "gauss", "gibbs", "gooding", "herrick_gibbs",
-    "kepler_transition", "lambert", "lambert_all", "laplace", "orbit_axes", "propagate_kepler", "range_to_state", "read_tle",
-    "sgp4_covariance", "sgp4_states", "state_axes", "three_ranges", "transform_covariance", "transform_root",
+    "kepler_transition", "lambert", "lambert_all", "laplace", "orbit_axes", "propagate_kepler", "radar", "range_to_state",
+    "read_tle", "sgp4_covariance", "sgp4_states", "state_axes", "three_ranges", "transform_covariance", "transform_root",
 ]  # fmt: skip
