@@ -3,7 +3,7 @@
 from piazzi.orbit.axes import covariance_root, orbit_axes, state_axes, transform_covariance, transform_root
 from piazzi.orbit.difference import Difference, difference
 from piazzi.orbit.double_r import double_r
-from piazzi.orbit.equinoctial import Equinoctial, ModifiedEquinoctial
+from piazzi.orbit.equinoctial import Equinoctial
 from piazzi.orbit.fit_mean import MeanFit, fit_sgp4
 from piazzi.orbit.from_directions import gauss, laplace
 from piazzi.orbit.from_positions import gibbs, herrick_gibbs
@@ -13,6 +13,7 @@ from piazzi.orbit.initial import InitialOrbit
 from piazzi.orbit.keplerian import Keplerian
 from piazzi.orbit.lambert import Transfer, lambert, lambert_all
 from piazzi.orbit.mean_elements import read_tle, sgp4_covariance, sgp4_states
+from piazzi.orbit.modified_equinoctial import ModifiedEquinoctial
 from piazzi.orbit.radar import radar
 from piazzi.orbit.two_body import kepler_transition, propagate_kepler
 
