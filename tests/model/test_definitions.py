@@ -196,7 +196,7 @@ def test_models_with_definitions_are_values():
 def test_sympy_definitions_are_as_good_as_text():
     x, y = sp.symbols("x y", real=True)
     model = pz.Model([x, y], [y, sp.Symbol("g", real=True)], definitions={sp.Symbol("g"): -x / (x**2 + y**2)})
-    assert model.definitions == (("g", "-x/(x**2 + y**2)"),)
+    assert dict(model.definitions) == {"g": "-x/(x**2 + y**2)"}
 
 
 # ---- what is refused -----------------------------------------------------------------------------------------------------

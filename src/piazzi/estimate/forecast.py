@@ -102,7 +102,7 @@ def _carried(problem: Problem, way: tuple[Any, ...], x: Array, P: Array) -> tupl
     last = Belief(mean=np.ascontiguousarray(x), covariance=np.ascontiguousarray(P))
     beliefs = Beliefs.empty(K=len(t), N=n)
     library = kernels.load(problem.spec("transition", problem.noise_fragment, "forecast"))
-    library.run_forecast(run, parts, problem.given_bundle, last, beliefs)
+    library.run_forecast(run, parts, problem.given_over(float(start), float(t[-1])), last, beliefs)
     return beliefs.members  # type: ignore[no-any-return]
 
 

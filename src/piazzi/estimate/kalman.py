@@ -176,7 +176,7 @@ def predict(problem: Problem, belief: Any, t: float, dt: float) -> Prediction:
     library = kernels.load(problem.spec("transition", problem.noise_fragment, "predict"))
     belief, noise = Belief(mean=x, covariance=P), problem.process_noise.covariance
     span = Interval(t=float(t), dt=float(dt), count=count, scale=scale)
-    library.predict_once(span, problem.given_bundle, noise, belief, Phi, Q)
+    library.predict_once(span, problem.given_over(t, t + dt), noise, belief, Phi, Q)
     return Prediction(x, P, Phi, Q)
 
 
@@ -198,7 +198,7 @@ def update(problem: Problem, belief: Any, station: str, z: Any, t: float = 0.0, 
     row[0, :width] = values
     innovations, measured = Innovations.empty(J=1, M=m), measured_by(problem, row, np.array([s]))
     library = kernels.load(problem.spec("transition", *update_fragments(problem, method), "update"))
-    library.update_once(float(t), problem.given_bundle, measured, Belief(mean=x, covariance=P), innovations)
+    library.update_once(float(t), problem.given_over(t, t), measured, Belief(mean=x, covariance=P), innovations)
     nu, S = innovations.members
     return Updated(x, P, nu[0, :width], S[0, :width, :width])
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from piazzi.expressions import evaluate
 from piazzi.model import Sensor
-from piazzi.model.definitions import with_values
+from piazzi.model.functions import STATION
+from piazzi.model.values import with_values
 from piazzi.problem import Problem, Station
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs
@@ -60,7 +61,13 @@ def prior_ratio(problem: Problem) -> float:
 
         def seen(x: Array, station: Station = station, sensor: Sensor = sensor) -> Array:
             values = given | dict(zip(model.names, x.tolist(), strict=True)) | dict(station.numbers)
-            values = with_values(values, model.definitions, sensor.definitions)
+            values = with_values(
+                values,
+                model.definitions,
+                sensor.definitions,
+                functions=dict(problem.functions) | {STATION: station.place},
+                model=model,
+            )
             return np.array([evaluate(equation, values) for equation in sensor.equations])
 
         moves = [1e-4 * s * unit for s, unit in zip(sigma, np.eye(model.n), strict=True)]

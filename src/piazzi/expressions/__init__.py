@@ -72,10 +72,11 @@ def to_sympy(text: str, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
         raise ExpressionError(f"{error}: write it in a simpler way", text) from None
 
 
-def from_sympy(expr: object) -> str:
+def from_sympy(expr: object, outside: Collection[str] | None = ()) -> str:
     """Return the canonical equation of a SymPy expression or a Python number, such that `to_sympy` gives it back.
 
-    Equal expressions give equal text in every process, and doubles survive bit for bit.
+    Equal expressions give equal text in every process, and doubles survive bit for bit.  `outside` names functions that the
+    expression may call beside those of the language, as SymPy's undefined functions; None is for any name.
 
     Raises
     ------
@@ -85,7 +86,7 @@ def from_sympy(expr: object) -> str:
     """
     from piazzi.expressions.writing import write
 
-    return write(expr)
+    return write(expr, outside)
 
 
 def _read_with(text: str, allowed: Collection[str] | Mapping[str, object]) -> Equation:

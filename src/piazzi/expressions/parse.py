@@ -15,7 +15,7 @@ RecursionError for sums of about 2900 terms).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -53,15 +53,18 @@ class Equation:
     names: Mapping[str, int] = field(compare=False, repr=False)
 
 
-def parse(text: str) -> Equation:
-    """Return the tree of an equation; `ExpressionError` says what is outside the language, and where."""
+def parse(text: str, outside: Collection[str] | None = ()) -> Equation:
+    """Return the tree of an equation; `ExpressionError` says what is outside the language, and where.
+
+    `outside` names further functions that it may call, with any number of arguments; None is for any name.
+    """
     if not isinstance(text, str):
         raise ExpressionError(f"an equation must be text, not {type(text).__name__}", "")
     if len(text) > MAX_LENGTH:
         raise ExpressionError(
             f"the equation has {len(text)} characters; at most {MAX_LENGTH} are allowed", text, MAX_LENGTH + 1
         )
-    reader = _Reader(text)
+    reader = _Reader(text, outside)
     try:
         tree = reader.sum()
     except RecursionError:  # only when the caller's own stack was all but used up
@@ -83,8 +86,9 @@ def is_name(text: str) -> bool:
 class _Reader:
     """One pass over the tokens by recursive descent; recursion is bounded by `MAX_DEPTH`, chains are loops."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, outside: Collection[str] | None) -> None:
         self.text = text
+        self.outside = outside
         self.tokens = iter(tokenize(text))
         self.next = next(self.tokens)
         self.names: dict[str, int] = {}
@@ -199,12 +203,19 @@ class _Reader:
 
     def call(self, token: Token) -> Call:
         function = token.piece
+        if function not in arities() and function not in CONSTANTS and self.is_outside(function):
+            return Call(function, self.bracket(many=True), token.column)
         if function not in arities():
-            hint = f"; write {quote(ALIASES[function])}" if function in ALIASES else suggest(function, arities())
+            known = [*arities(), *(self.outside or ())]
+            hint = f"; write {quote(ALIASES[function])}" if function in ALIASES else suggest(function, known)
             raise self.error(f"{quote(function)} is not a function{hint or '; write * to multiply'}", token)
         arguments = self.bracket(many=True)
         self.check_count(token, len(arguments))
         return Call(function, arguments, token.column)
+
+    def is_outside(self, function: str) -> bool:
+        """Whether a name may be that of a function from outside."""
+        return function not in ALIASES if self.outside is None else function in self.outside
 
     def check_count(self, token: Token, got: int) -> None:
         function = TABLE[token.piece]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 from piazzi.expressions.functions import arities, of_sympy
 from piazzi.expressions.language import MAX_DIGITS, MAX_LENGTH, ExpressionError, quote
 from piazzi.expressions.limits import read
-from piazzi.expressions.parse import is_name
+from piazzi.expressions.parse import is_name, parse
 
 # How tightly a piece of text holds together: a looser piece goes into brackets inside a tighter one.
 SUM, PRODUCT, POWER, ATOM = range(4)
@@ -24,14 +24,20 @@ class _UnsupportedError(Exception):
         self.part, self.reason = part, reason
 
 
-def write(expr: object) -> str:
-    """Return the canonical equation of a SymPy expression or Python number; `ExpressionError` names what has none."""
+def write(expr: object, outside: Collection[str] | None = ()) -> str:
+    """Return the canonical equation of a SymPy expression or Python number; `ExpressionError` names what has none.
+
+    `outside` as in `parse`: SymPy's undefined functions of these names are calls of them.
+    """
     try:
         _check_symbols(expr)
         text, _ = _write(expr)
         if len(text) > MAX_LENGTH:
             text = text.replace(" ", "")
-        read(text)
+        if outside is not None and not outside:
+            read(text)
+        else:
+            parse(text, outside)
     except _UnsupportedError as error:
         whole, part = str(expr), str(error.part)
         raise ExpressionError(f"{quote(part)}: {error.reason}", whole, max(whole.find(part), 0) + 1) from None
@@ -147,6 +153,8 @@ def _call(expr: Any) -> str:
     import sympy as sp
 
     function = of_sympy(expr)
+    if isinstance(expr, sp.core.function.AppliedUndef) and is_name(expr.func.__name__):
+        return f"{expr.func.__name__}({', '.join(_write(argument)[0] for argument in expr.args)})"
     if function is None or function.derived:
         raise _unsupported(expr)
     arguments = _in_order(expr.args) if function.variadic else expr.args

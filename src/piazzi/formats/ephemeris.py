@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piazzi.earth import Epoch
-from piazzi.formats.copying import reduced
 
 Array = np.ndarray[Any, Any]
 
@@ -93,9 +92,6 @@ class Arc:
 
     def __len__(self) -> int:
         return len(self.t)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return reduced(self)
 
     def instant(self, k: int) -> Epoch:
         """When a state is."""

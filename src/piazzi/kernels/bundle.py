@@ -23,8 +23,11 @@ class Run(
     """Epochs of a run: times, substeps and noise scale of the interval before each, where its rows begin; process noise."""
 
 
-class Given(Bundle, parameters="P", manoeuvres="*"):
-    """What a model is told: values of its parameters; how many manoeuvres, then time, jump and covariance of each."""
+class Given(Bundle, parameters="P", manoeuvres="*", data="*"):
+    """What a model is told: values of its parameters; how many manoeuvres, then time, jump and covariance of each.
+
+    `data` of functions from outside: where those of each begin, then these.
+    """
 
 
 class Measured(Bundle, z="J M", station="int64 J", sensor="int64 S", numbers="S U", R="S M M", correlated="int64 S"):

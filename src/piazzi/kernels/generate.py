@@ -16,13 +16,16 @@ the factors of an update.  The functions:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
+from piazzi.kernels.outside import outside_source
 from piazzi.kernels.printer import function, in_time
 from piazzi.kernels.steps import adaptive_source, axes_source, kepler_source, runge_kutta_source
 from piazzi.kernels.steps import inline_source as _inline
+from piazzi.kernels.tableaus import DORMAND_PRINCE_8
 from piazzi.model import Model
 from piazzi.model.derivation import constant_acceleration_step, derive, derive_sensor
 
@@ -49,9 +52,12 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
         "LOST": 1e-15 * max(model.n, 4),  # of a diagonal: what is left below it is rounding
     }
     parts = ["".join(f"{k} = {v}\n" for k, v in sizes.items()), "\n\n", _identity_source(model), axes_source(model)]
+    parts.append(outside_source(model))
     if not model.discrete:
         parts.append(_dynamics_source(model))
     parts.append(_step_source(model, scheme))
+    if model.looks_elsewhen:
+        parts.append(re.sub(r"\bsubstep", "elsewhen", runge_kutta_source(*DORMAND_PRINCE_8, rule=False)))
     parts.append(_sensor_source(model))
     return "".join(parts)
 
@@ -62,7 +68,7 @@ def _arguments(model: Model, extra: Sequence[str] = ()) -> tuple[list[str], dict
     names = {s: f"x{i}" for i, s in enumerate(d.x)} | {s: f"p{i}" for i, s in enumerate(d.p)} | {d.t: "t"}
     arguments = ["t", *extra, *(f"x{i}" for i in range(len(d.x))), *(f"p{i}" for i in range(len(d.p)))]
     call = ", ".join(["t", *extra, *(f"x[{i}]" for i in range(len(d.x))), *(f"p.parameters[{i}]" for i in range(len(d.p)))])
-    return arguments, names, call
+    return (["p", *arguments], names, f"p, {call}") if model.reads_data else (arguments, names, call)
 
 
 def _identity_source(model: Model) -> str:

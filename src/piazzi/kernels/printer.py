@@ -14,16 +14,18 @@ from typing import TYPE_CHECKING, TypeVar
 from piazzi.expressions import time_limit
 from piazzi.expressions.functions import of_sympy
 from piazzi.expressions.time_limit import TooSlowError, each_with_time_limit, with_time_limit
+from piazzi.model.derivation import Call, Elsewhen, Solve, Stage
 
 if TYPE_CHECKING:
     import sympy as sp
 
-    from piazzi.model.derivation import Stage
+    from piazzi.model.derivation import AnyStage
 
     Spread = dict[sp.Symbol, sp.Expr]
 
 A = TypeVar("A")
 T = TypeVar("T")
+CONVERGED = 1e-6  # the last step to a root, relative to it: Newton's method squares that, so that 1e-12 is left
 _SLOW = 4  # cycles of a root or a quotient, in multiplications
 
 
@@ -47,6 +49,16 @@ class _Writer:
         self.lines.append(f"{name} = {text}")
         self.depths[symbol] = self.depth(value)
         self.names[symbol] = name
+
+    def next_name(self) -> str:
+        """A name for what is defined next."""
+        self.defined += 1
+        return f"d{self.defined - 1}"
+
+    def defines(self, symbol: sp.Symbol) -> str:
+        """A name for the symbol of what a call gives."""
+        self.depths[symbol], self.names[symbol] = _SLOW, self.next_name()
+        return str(self.names[symbol])
 
     def is_late_product(self, e: sp.Expr) -> bool:
         """Whether `e` is one slow factor times quick ones: better multiplied anew where it is used, the slow factor last."""
@@ -166,7 +178,7 @@ def function(
     arguments: Sequence[str],
     names: Mapping[sp.Symbol, str],
     outputs: Sequence[sp.Expr],
-    stages: Sequence[Stage] = (),
+    stages: Sequence[AnyStage] = (),
     called: Sequence[str] = (),
 ) -> str:
     """Source of an inlined scalar function that returns the tuple of `outputs`; `called` names the equation of each.
@@ -194,15 +206,63 @@ def in_time(called: Callable[[int], str], write: Callable[[A], T], items: Sequen
         raise ValueError(f"code of {called(error.at)}: {error}") from None
 
 
-def _define(writer: _Writer, stage: Stage) -> None:
+def _define(writer: _Writer, stage: AnyStage) -> None:
     """Write a definition and its derivatives."""
+    match stage:
+        case Stage():
+            _define_values(writer, stage)
+        case Call():
+            place = f"p.data[{stage.place}]" if isinstance(stage.place, int) else writer.text(stage.place)
+            arguments = [writer.atom(a) for a in stage.arguments]
+            place = place if isinstance(stage.place, int) else f"p.data[int({place})]"
+            call = f"{stage.function}({', '.join([*arguments, 'p.data', f'int({place})'])})"
+            writer.lines.append(f"({', '.join(writer.defines(s) for s in stage.symbols)},) = {call}")
+        case Elsewhen():
+            _define_elsewhen(writer, stage)
+        case Solve():
+            _define_root(writer, stage)
+
+
+def _define_values(writer: _Writer, stage: Stage) -> None:
     shared, reduced = _common(stage.values)
     spread: Spread = {}
     for part in shared:
         _place(writer, part, spread)
     for symbol, value in zip(stage.symbols, reduced, strict=True):
-        writer.name(symbol, f"d{writer.defined}", value.xreplace(spread))
-        writer.defined += 1
+        writer.name(symbol, writer.next_name(), value.xreplace(spread))
+
+
+def _define_elsewhen(writer: _Writer, stage: Elsewhen) -> None:
+    """The state `offset` later by one step, with the transition matrix and the rates there."""
+    offset, y = writer.atom(stage.offset), writer.next_name()
+    n = sum(name.startswith("x") and name[1:].isdigit() for name in writer.names.values())
+    state = f"vector({', '.join(f'x{i}' for i in range(n))})"
+    if stage.transition:
+        R = writer.next_name()
+        writer.lines.append(f"{y}, {R} = elsewhen_jacobian(t, {offset}, {state}, identity_rows(), p)")
+    else:
+        writer.lines.append(f"{y} = elsewhen(t, {offset}, {state}, p)")
+    writer.lines += [f"{writer.defines(s)} = {y}[{i}]" for i, s in enumerate(stage.symbols)]
+    writer.lines += [f"{writer.defines(s)} = {R}[{i // n}][{i % n}]" for i, s in enumerate(stage.transition)]
+    if stage.rates:
+        f = writer.next_name()
+        writer.lines.append(f"{f} = dynamics(t + {offset}, {y}, p)")
+        writer.lines += [f"{writer.defines(s)} = {f}[{i}]" for i, s in enumerate(stage.rates)]
+
+
+def _define_root(writer: _Writer, stage: Solve) -> None:
+    """Newton's iteration, from a start in as many lanes as the state has; NaN where its last step is not small."""
+    trial, step = writer.defines(stage.unknown), writer.next_name()
+    writer.lines += [f"{trial} = {writer.text(stage.start)} + 0.0*x0", f"{step} = {trial}"]
+    outside, writer.lines = writer.lines, []
+    for inner in stage.inner:
+        _define(writer, inner)
+    writer.lines.append(f"{step} = {writer.atom(stage.residual)}/{writer.atom(stage.slope)}")
+    writer.lines.append(f"{trial} = {trial} - {step}")
+    body, writer.lines = writer.lines, outside
+    writer.lines += [f"for _ in range({stage.iterations}):", *(f"    {line}" for line in body)]
+    small = f"{CONVERGED!r}*fabs({trial}) + 1e-300"
+    writer.lines.append(f"{writer.defines(stage.symbols[0])} = choose({small}, fabs({step}), {trial}, nan)")
 
 
 def _written(writer: _Writer, outputs: Sequence[sp.Expr], called: Sequence[str]) -> list[str]:

@@ -26,7 +26,7 @@ def _combination(base: str, k: str, coefficients: Sequence[float], h: str = "*h"
     return " + ".join([base, *terms] if base else terms)
 
 
-def runge_kutta_source(a: Sequence[Row], weights: Row, nodes: Row) -> str:
+def runge_kutta_source(a: Sequence[Row], weights: Row, nodes: Row, *, rule: bool = True) -> str:
     """The stages of an explicit tableau, on the state alone and on state and transition matrix together.
 
     Many stages are compiled once and called: inlined wherever a step is taken, they would take minutes to compile.
@@ -40,8 +40,8 @@ def runge_kutta_source(a: Sequence[Row], weights: Row, nodes: Row) -> str:
     alone.append(f"return {_combination('x', 'k', weights)}")
     both.append(f"return {_combination('x', 'k', weights)}, {_combination('R', 'K', weights)}")
     step, jacobian = "substep(t, h, x, p)", "substep_jacobian(t, h, x, R, p)"
-    rule = rule_source(noise_order(len(weights)))
-    return rule + inline_source(step, *alone, mark=mark) + inline_source(jacobian, *both, mark=mark)
+    noise = rule_source(noise_order(len(weights))) if rule else ""
+    return noise + inline_source(step, *alone, mark=mark) + inline_source(jacobian, *both, mark=mark)
 
 
 def adaptive_source(model: Model, rtol: float, atol: float, max_steps: int) -> str:

@@ -2,22 +2,110 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
-from piazzi.expressions import evaluate, from_sympy, is_name, names
+from piazzi.expressions import from_sympy, is_name, names
+from piazzi.expressions.outside import split, whole_call
+from piazzi.model.functions import ROOT
 
 TIME = "t"
 STEP = "dt"
-Definitions = tuple[tuple[str, str], ...]
+ITERATIONS = 4
+
+
+@dataclass(frozen=True)
+class Definition:
+    """One or several named values that are worked out together.
+
+    `texts` is the equation of a value; with a `function` the arguments of its call; of a root the equation that is zero and
+    where the iteration starts, with `iterations` Newton steps through definitions `inner` of its own.
+    """
+
+    names: tuple[str, ...]
+    texts: tuple[str, ...]
+    function: str = ""
+    inner: tuple[Definition, ...] = ()
+    iterations: int = 0
+
+    def __iter__(self) -> Iterator[str]:
+        """The names and the text, as a scenario has them."""
+        return iter((", ".join(self.names), self.text))
+
+    @property
+    def text(self) -> str:
+        """Its equation, or the call that gives it."""
+        return f"{self.function}({', '.join(self.texts)})" if self.function else self.texts[0]
+
+    @cached_property
+    def provides(self) -> tuple[str, ...]:
+        """Every name that has a value once this is worked out."""
+        return (*self.names, *(name for d in self.inner for name in d.provides))
+
+    @cached_property
+    def needs(self) -> frozenset[str]:
+        """Names that have to be known before."""
+        found = [name for text in self.texts for name in names(text)]
+        if self.function != ROOT:
+            return frozenset(found)
+        return frozenset([*found, *(name for d in self.inner for name in d.needs)]) - set(self.provides)
+
+    @property
+    def calls(self) -> Iterator[Definition]:
+        """Calls of functions from outside, in it and in its own definitions."""
+        if self.function and self.function != ROOT:
+            yield self
+        for d in self.inner:
+            yield from d.calls
+
+
+Definitions = tuple[Definition, ...]
+
+
+class Hoist:
+    """Calls of functions from outside, each made a definition with a name of its own.
+
+    `outside` names the functions; None is for any name, where they are not known yet.
+    """
+
+    def __init__(self, outside: Collection[str] | None, suffix: str = "") -> None:
+        self.outside = outside
+        self.found: list[Definition] = []
+        self._suffix = suffix
+        self._seen: dict[tuple[str, tuple[str, ...]], str] = {}
+
+    def text(self, equation: Any) -> str:
+        """Canonical text of an equation given as text, number or SymPy expression; raises `ExpressionError`."""
+        written = equation.strip() if isinstance(equation, str) else from_sympy(equation, self.outside)
+        rest = split(written, self.outside, self._stand_in)
+        names(rest)
+        return rest
+
+    def _stand_in(self, function: str, arguments: tuple[str, ...]) -> str:
+        """The name of a call's value: one for every function and set of arguments."""
+        if (function, arguments) not in self._seen:
+            name = self._seen[function, arguments] = f"{function}_{len(self._seen) + 1}{self._suffix}"
+            self.found.append(Definition((name,), arguments, function))
+        return self._seen[function, arguments]
+
+    def definition(self, left: tuple[str, ...], equation: Any) -> Definition:
+        """Names and what they are: a value, or the outputs of one call."""
+        written = equation.strip() if isinstance(equation, str) else from_sympy(equation, self.outside)
+        if whole_call(written, self.outside):
+            self.text(written)
+            made = self.found.pop()
+            self._seen.pop((made.function, made.texts))
+            return replace(made, names=left)
+        if len(left) > 1:
+            raise ValueError(f"{', '.join(left)} are several values, which only a function from outside gives: {written!r}")
+        return Definition(left, (self.text(written),))
 
 
 def text_of(equation: Any) -> str:
-    """Canonical text of an equation given as text, number or SymPy expression; raises `ExpressionError`."""
-    if isinstance(equation, str):
-        names(equation)
-        return equation.strip()
-    return from_sympy(equation)
+    """Canonical text of an equation of the language, given as text, number or SymPy expression; raises `ExpressionError`."""
+    return Hoist(()).text(equation)
 
 
 def name_of(symbol: Any, what: str) -> str:
@@ -30,31 +118,64 @@ def name_of(symbol: Any, what: str) -> str:
     return name
 
 
-def definitions_of(given: Any, owner: str) -> Definitions:
-    """Names and the text of their equations, sorted by what they need.
+def definitions_of(given: Any, owner: str, hoist: Hoist, roots: Any = ()) -> Definitions:
+    """Definitions and roots as given, with the calls in them; unsorted (see `in_order`).
 
     Raises
     ------
     ValueError
-        For a name that cannot stand in an equation, an equation outside the language, or definitions that need each other.
+        For a name that cannot stand in an equation, or an equation outside the language.
     """
     pairs = given.items() if isinstance(given, Mapping) else tuple(given)
-    texts = {name_of(name, "definition"): text_of(equation) for name, equation in pairs}
-    if len(texts) < len(pairs):
-        raise ValueError(f"{owner}: a name is defined twice")
-    return _sorted(texts, owner)
+    out = [d if isinstance(d, Definition) else hoist.definition(_names_of(d[0]), d[1]) for d in pairs]
+    for name, root in dict(roots).items():
+        out.append(_root(name_of(name, "root"), root, owner, hoist))
+    return tuple(out)
 
 
-def _sorted(texts: Mapping[str, str], owner: str) -> Definitions:
-    """By need, and else in the order given."""
-    needs = {name: names(text) & texts.keys() for name, text in texts.items()}
-    done: dict[str, str] = {}
-    while len(done) < len(texts):
-        ready = [name for name in texts if name not in done and needs[name] <= done.keys()]
+def _names_of(left: Any) -> tuple[str, ...]:
+    parts = left.split(",") if isinstance(left, str) else left if isinstance(left, tuple | list) else [left]
+    return tuple(name_of(part.strip() if isinstance(part, str) else part, "definition") for part in parts)
+
+
+def _root(name: str, given: Any, owner: str, hoist: Hoist) -> Definition:
+    """A root from its table: `root`, `start`, `iterations`, `definitions`."""
+    where = f"{owner}: root {name!r}"
+    table = dict(given)
+    for key in table.keys() - {"root", "start", "iterations", "definitions", "roots"}:
+        raise ValueError(f"{where} has {key!r}; it takes root, start, iterations, definitions and roots")
+    if "root" not in table:
+        raise ValueError(f"{where} has no equation: give root = an expression that is zero at the solution")
+    iterations = table.get("iterations", ITERATIONS)
+    if not isinstance(iterations, int) or not 1 <= iterations <= 20:
+        raise ValueError(f"{where} has iterations = {iterations!r}; it must be a whole number from 1 to 20")
+    own = Hoist(hoist.outside, f"_{name}")
+    equation = own.text(table["root"])
+    start = hoist.text(table.get("start", "0"))
+    inner = definitions_of(table.get("definitions", {}), where, own, table.get("roots", {}))
+    return Definition((name,), (equation, start), ROOT, in_order((*inner, *own.found), where, (name,)), iterations)
+
+
+def in_order(given: Iterable[Definition], owner: str, known: Collection[str] = ()) -> Definitions:
+    """By need, and else in the order given; raises ValueError for definitions that need each other, or names given twice."""
+    waiting = list(given)
+    by_name: dict[str, Definition] = {}
+    for d in waiting:
+        for name in d.provides:
+            if name in by_name or name in known:
+                raise ValueError(f"{owner}: a name is defined twice ({name!r})")
+            by_name[name] = d
+    done: list[Definition] = []
+    have: set[str] = set()
+    while waiting:
+        ready = [d for d in waiting if d.needs & by_name.keys() <= have]
         if not ready:
-            raise ValueError(f"{owner}: {_circle(needs, done)} need each other")
-        done.update((name, texts[name]) for name in ready)
-    return tuple(done.items())
+            needs = {name: d.needs & by_name.keys() for d in waiting for name in d.names}
+            raise ValueError(f"{owner}: {_circle(needs, have)} need each other")
+        done += ready
+        have.update(name for d in ready for name in d.provides)
+        waiting = [d for d in waiting if d not in ready]
+    return tuple(done)
 
 
 def _circle(needs: Mapping[str, Collection[str]], done: Collection[str]) -> str:
@@ -70,28 +191,22 @@ def _circle(needs: Mapping[str, Collection[str]], done: Collection[str]) -> str:
 
 def needed(wanted: Iterable[str], *layers: Definitions) -> frozenset[str]:
     """The names that occur in these texts, or in a definition that they need."""
-    texts = {name: text for layer in layers for name, text in layer}
+    definitions = {name: d for layer in layers for d in layer for name in d.provides}
     found: set[str] = set()
     waiting = [name for text in wanted for name in names(text)]
     while waiting:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting += names(texts[name]) if name in texts else ()
+            if name in definitions:
+                waiting += (*definitions[name].names, *definitions[name].needs)
     return frozenset(found)
 
 
-def with_values(values: Mapping[str, float], *layers: Definitions) -> dict[str, float]:
-    """The values with those of the definitions beside them; a definition whose own names have no value is left out."""
-    out = dict(values)
-    for layer in layers:
-        for name, text in layer:
-            if all(n in out for n in names(text)):
-                out[name] = evaluate(text, out)
-    return out
+Evaluator = Callable[[Definition, dict[str, float]], Sequence[float]]
 
 
 def unused(definitions: Definitions, users: Sequence[str]) -> list[str]:
-    """Names of definitions that no equation needs."""
+    """Names of definitions of which no equation needs any value."""
     found = needed(users, definitions)
-    return [name for name, _ in definitions if name not in found]
+    return [", ".join(d.names) for d in definitions if not found & set(d.provides)]

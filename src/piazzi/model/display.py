@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from piazzi.model.derivation import Equations, Stage, derive, derive_sensor
+from piazzi.model.derivation import AnyStage, Call, Elsewhen, Equations, Solve, Stage, derive, derive_sensor
 
 
 def sections(model: Equations) -> list[tuple[str, Any]]:
@@ -28,14 +28,31 @@ def sections(model: Equations) -> list[tuple[str, Any]]:
     return out
 
 
-def _shown(stages: Sequence[Stage], what: str = "") -> list[tuple[str, Any]]:
+def _shown(stages: Sequence[AnyStage], what: str = "") -> list[tuple[str, Any]]:
     """Definitions with their derivatives."""
     import sympy as sp
 
     if not stages:
         return []
-    rows = [[s, v] for stage in stages for s, v in zip(stage.symbols, stage.values, strict=True)]
+    rows = [[s, v] for stage in stages for s, v in _rows(stage)]
     return [(f"definitions and their derivatives{what}", sp.Matrix(rows))]
+
+
+def _rows(stage: AnyStage) -> list[tuple[Any, Any]]:
+    """What is defined together, and what it is."""
+    import sympy as sp
+
+    match stage:
+        case Stage():
+            return list(zip(stage.symbols, stage.values, strict=True))
+        case Call():
+            name, arguments = stage.function.removesuffix("_partials"), stage.arguments
+        case Elsewhen():
+            name, arguments = "at", (stage.offset,)
+        case Solve():
+            inner = [row for own in stage.inner for row in _rows(own)]
+            return [*inner, (stage.symbols[0], sp.Function("root")(stage.residual, stage.unknown))]
+    return [(s, sp.Function(f"{name}_{i}")(*arguments)) for i, s in enumerate(stage.symbols)]
 
 
 def latex(model: Equations) -> str:

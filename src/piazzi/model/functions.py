@@ -5,6 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+AT = "at"  # the state at another instant
+ROOT = "root"  # a value that makes an equation zero
+STATION_TABLE = "station_table"  # the number of a station that says which table is its own
+STATION_TERMS = 12
+STATION = "station"  # where the station of the row is: its table is found by a number of the station
+
 
 @dataclass(frozen=True)
 class Signature:
@@ -19,6 +25,8 @@ class Signature:
     partials : pairs of output and argument whose derivative is known, by output, then argument; the others are zero
     terms : coefficients of a piece of a table
     code : text of a fragment of the user's own
+    transposed : of a rotation, whether the table holds the inverse
+    shared : what functions that read the same table have in common
     """
 
     kind: str
@@ -27,11 +35,23 @@ class Signature:
     partials: tuple[tuple[int, int], ...]
     terms: int = 0
     code: str = ""
+    transposed: bool = False
+    shared: str = ""
 
     @property
     def function(self) -> str:
         """Name of the function in the source of kernels."""
         return f"{self.kind}_{self.outputs}x{self.terms}" if self.terms else self.kind
+
+    @classmethod
+    def of_table(cls, columns: int, terms: int) -> Signature:
+        """The signature of a table over time, whose columns are all derived by it."""
+        return cls("table", 1, columns, tuple((i, 0) for i in range(columns)), terms)
+
+    @classmethod
+    def of_station(cls) -> Signature:
+        """The signature of a station's own table: position and velocity."""
+        return cls.of_table(6, STATION_TERMS)
 
 
 def signature_of(given: Any, name: str) -> Signature:

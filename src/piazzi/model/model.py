@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from piazzi.expressions import names
-from piazzi.model.definitions import STEP, TIME, definitions_of, name_of, needed, text_of, unused
+from piazzi.expressions import FUNCTIONS, names
+from piazzi.model.definitions import STEP, TIME, Definition, Hoist, definitions_of, in_order, name_of, needed, unused
+from piazzi.model.functions import AT, ROOT, STATION, Signature, signature_of
 from piazzi.model.sensor import Parameter, Sensor, as_tuple
-from piazzi.text import nearest
+from piazzi.text import nearest, suggest
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,10 @@ class Model:
         Further values that hold what a state was at the epoch before, for measurements of two neighbouring states.
     definitions : mapping of name to equation, such as ``{"r2": "x**2 + y**2"}``
         Values that dynamics, sensors and other definitions use by name, in any order.  Each is worked out once, and derived by
-        the chain rule; nothing is substituted.
+        the chain rule; nothing is substituted.  Several names take the values of one function: ``{"gx, gy, gz": "field(x, y,
+        z)"}``, or a tuple of names; they may be fewer than the function has.
+    functions : mapping of name to function, or to its signature
+        Functions from outside that the equations may call, such as ``earth.Gravity(...)``; their data belong to the `Problem`.
 
     Raises
     ------
@@ -50,6 +54,7 @@ class Model:
     discrete: bool = False
     memory: Any = field(default_factory=dict)
     definitions: Any = field(default_factory=dict)
+    functions: Any = ()
 
     if TYPE_CHECKING:  # what is taken; the fields above say what is kept of it
 
@@ -63,7 +68,8 @@ class Model:
             units: Mapping[str, str] | Sequence[tuple[str, str]] = (),
             discrete: bool = False,
             memory: Mapping[str, str] | Sequence[tuple[str, str]] = (),
-            definitions: Mapping[str, Any] | Sequence[tuple[str, Any]] = (),
+            definitions: Mapping[Any, Any] | Sequence[Any] = (),
+            functions: Mapping[str, Any] | Sequence[tuple[str, Any]] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -73,8 +79,12 @@ class Model:
         put(self, "sensors", self._sensors())
         remembered = tuple((name_of(k, "memory"), str(v)) for k, v in dict(self.memory).items())
         put(self, "memory", remembered)
-        put(self, "definitions", definitions_of(self.definitions, "definitions"))
-        put(self, "dynamics", self._equations())
+        functions = dict(self.functions).items()
+        put(self, "functions", tuple((name_of(k, "function"), signature_of(v, str(k))) for k, v in functions))
+        hoist = Hoist([name for name, _ in self.functions])
+        given = definitions_of(self.definitions, "definitions", hoist)
+        put(self, "dynamics", self._equations(hoist))
+        put(self, "definitions", in_order((*given, *hoist.found), "definitions"))
         put(self, "groups", tuple((str(g), tuple(str(s) for s in members)) for g, members in dict(self.groups).items()))
         put(self, "units", tuple((str(s), str(u)) for s, u in dict(self.units).items()))
         self._check_names()
@@ -87,7 +97,7 @@ class Model:
                 raise ValueError(f"sensors has {sensor!r}; it must be a Sensor(name, equations)")
         return given
 
-    def _equations(self) -> tuple[str, ...]:
+    def _equations(self, hoist: Hoist) -> tuple[str, ...]:
         given = self.dynamics
         if isinstance(given, Mapping):
             by_name = {str(k): v for k, v in given.items()}
@@ -98,7 +108,7 @@ class Model:
             if missing:
                 raise ValueError(f"dynamics has no equation for state {missing[0]!r}")
             given = tuple(by_name[s] for s in self.states)
-        equations = tuple(text_of(e) for e in as_tuple(given, "dynamics"))
+        equations = tuple(hoist.text(e) for e in as_tuple(given, "dynamics"))
         if len(equations) != len(self.states):
             raise ValueError(
                 f"dynamics has {len(equations)} equations for {len(self.states)} states ({', '.join(self.states)})"
@@ -111,7 +121,8 @@ class Model:
         taken: dict[str, str] = {TIME: "the time", STEP: "the length of a step"}
         everything = [("state", s) for s in self.states] + [("parameter", p.name) for p in self.parameters]
         everything += [("memory", name) for name, _ in self.memory]
-        everything += [("definition", name) for name, _ in self.definitions]
+        everything += [("definition", name) for d in self.definitions for name in d.provides]
+        everything += [("function", name) for name, _ in self.functions]
         for what, name in everything:
             if name in taken:
                 raise ValueError(f"{what} {name!r} is also {taken[name]}: every name has one meaning")
@@ -121,7 +132,7 @@ class Model:
             if sensor.name in seen:
                 raise ValueError(f"two sensors are called {sensor.name!r}")
             seen.add(sensor.name)
-            for name, _ in sensor.definitions:
+            for name in (name for d in sensor.definitions for name in d.provides):
                 if name in taken:
                     raise ValueError(f"sensor {sensor.name!r} defines {name!r}, which is also {taken[name]}")
         for group, members in self.groups:
@@ -136,11 +147,12 @@ class Model:
                 raise ValueError(f"units names {name!r}, which is not a state{nearest(name, self.names)}")
 
     def _check_equations(self) -> None:
-        defined = {name for name, _ in self.definitions}
+        defined = {name for d in self.definitions for name in d.provides}
         allowed = {*self.moving, *self.parameter_names, TIME, *defined} | ({STEP} if self.discrete else set())
         equations = [(f"dynamics of {state!r}", text) for state, text in zip(self.states, self.dynamics, strict=True)]
-        for what, equation in [*equations, *((f"definition {name!r}", text) for name, text in self.definitions)]:
-            for name in sorted(names(equation) - allowed):
+        needs = [(what, names(text)) for what, text in equations]
+        for what, found in [*needs, *((f"definition {', '.join(d.names)!r}", d.needs) for d in self.definitions)]:
+            for name in sorted(found - allowed):
                 hint = nearest(name, sorted(allowed))
                 raise ValueError(f"{what} uses {name!r}, which is neither a state nor a parameter{hint}")
         for sensor in self.sensors:
@@ -149,6 +161,67 @@ class Model:
         users = (*self.dynamics, *(name for sensor in self.sensors for name in sorted(sensor.free_names)))
         for name in unused(self.definitions, users):
             raise ValueError(f"definition {name!r} is used by no equation")
+        self._check_calls()
+
+    def _check_calls(self) -> None:
+        """Every call is of a function that is there, with its number of arguments, and wants no more values than it has."""
+        known = dict(self.functions)
+        for reserved in (AT, ROOT, STATION):
+            if reserved in known:
+                raise ValueError(f"function {reserved!r} has a meaning already: give it another name")
+        owners = [("", self.definitions), *((f"sensor {s.name!r}: ", s.definitions) for s in self.sensors)]
+        for owner, call in ((owner, call) for owner, definitions in owners for d in definitions for call in d.calls):
+            outside = {**known, STATION: Signature.of_station()} if owner else known
+            if call.function == AT and owner:
+                self._check_at(owner, call)
+                continue
+            if call.function not in outside:
+                hint = suggest(call.function, [*FUNCTIONS, *outside])
+                raise ValueError(f"{owner}{call.function!r} is not a function{hint or '; write * to multiply'}")
+            signature, got = outside[call.function], len(call.texts)
+            if got != signature.arguments:
+                plural = "" if signature.arguments == 1 else "s"
+                raise ValueError(f"{owner}{call.text}: {call.function} takes {signature.arguments} argument{plural}, got {got}")
+            if len(call.names) > signature.outputs:
+                raise ValueError(f"{owner}{call.text} gives {signature.outputs} values, not {len(call.names)}")
+            if len(call.names) < signature.outputs and call.names[0].startswith(f"{call.function}_") and len(call.names) == 1:
+                raise ValueError(
+                    f"{owner}{call.text} gives {signature.outputs} values: name them in a definition, such as "
+                    f"'a, b' = {call.text!r}"
+                )
+
+    def _check_at(self, owner: str, call: Definition) -> None:
+        if self.discrete:
+            raise ValueError(f"{owner}{call.text}: a model that is a step has no state between its epochs")
+        if len(call.texts) not in (1, 2) or call.texts[1:] not in ((), ("2",)):
+            raise ValueError(f"{owner}{call.text}: write at(offset), or at(offset, order=2)")
+        if len(call.names) > len(self.states):
+            raise ValueError(f"{owner}{call.text} gives the {len(self.states)} states, not {len(call.names)} values")
+
+    @cached_property
+    def signatures(self) -> tuple[Signature, ...]:
+        """Of all functions from outside that its equations call."""
+        called = {call.function for d in self.definitions for call in d.calls}
+        called |= {function for sensor in self.sensors for function in sensor.calls}
+        found = [signature for name, signature in self.functions if name in called]
+        return (*found, *([Signature.of_station()] if STATION in called else []))
+
+    @cached_property
+    def slots(self) -> dict[str, int]:
+        """For every function from outside, the number of its data: functions that share a table have one."""
+        keys = list(dict.fromkeys(signature.shared or name for name, signature in self.functions))
+        return {name: keys.index(signature.shared or name) for name, signature in self.functions}
+
+    @cached_property
+    def looks_elsewhen(self) -> bool:
+        """Whether a sensor asks for the state at another instant, by a step of the dynamics."""
+        calls = (call for sensor in self.sensors for d in sensor.definitions for call in d.calls)
+        return any(call.function == AT and len(call.texts) == 1 for call in calls)
+
+    @cached_property
+    def reads_data(self) -> bool:
+        """Whether its functions in the source of kernels take what the model is told as a whole."""
+        return bool(self.signatures) or self.looks_elsewhen
 
     def __hash__(self) -> int:
         return self._hash
@@ -223,7 +296,7 @@ class Model:
 
     @cached_property
     def _numbers(self) -> dict[str, tuple[str, ...]]:
-        taken = {*self.moving, *self.parameter_names, TIME, *(name for name, _ in self.definitions)}
+        taken = {*self.moving, *self.parameter_names, TIME, *(n for d in self.definitions for n in d.provides)}
         return {sensor.name: tuple(sorted(sensor.free_names - taken)) for sensor in self.sensors}
 
     def unit(self, name: str) -> str:

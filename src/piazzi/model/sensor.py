@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from piazzi.model.definitions import definitions_of, name_of, needed, text_of, unused
+from piazzi.model.definitions import Hoist, definitions_of, in_order, name_of, needed, unused
+from piazzi.model.functions import STATION, STATION_TABLE
 
 Role = Literal["fixed", "estimated", "considered"]
 
@@ -52,9 +53,15 @@ class Sensor:
     units : mapping of component name to unit, for tables, pictures and columns of files; angles default to "rad".
     number_units : mapping of the sensor's own numbers to units, for those that are estimated
     definitions : mapping of name to equation
-        Values that the sensor's equations use by name; see `Model`.
+        Values that the sensor's equations use by name; see `Model`.  Beside the functions of the model they may call
+        ``station(t)``, position and velocity (m, m/s, GCRF) of the station of the row, and ``at(offset)``, the states `offset`
+        seconds later: by a step of order 8 of the dynamics, or, as ``at(offset, order=2)``, to second order in the offset.
     visible : sequence of equations
         Rules of states, parameters, definitions, numbers and `t`: a simulated station measures where all are above zero.
+    roots : mapping of name to a table of ``root``, ``start``, ``iterations`` and ``definitions``
+        Values given by an equation they solve, such as a light time: ``root`` is zero at the solution, which Newton's method
+        finds from ``start``; the root's own definitions may use it, and stay names like any other.  Process noise within
+        an offset is left out.
 
     Raises
     ------
@@ -69,6 +76,7 @@ class Sensor:
     number_units: Any = field(default_factory=dict)
     definitions: Any = field(default_factory=dict)
     visible: Any = field(default=(), repr=False)  # no kernel, and no checkpoint, depends on it
+    roots: Any = ()
     components: tuple[str, ...] = field(init=False)
 
     if TYPE_CHECKING:  # what is taken; the fields above say what is kept of it
@@ -80,8 +88,9 @@ class Sensor:
             angles: Sequence[str] = (),
             units: Mapping[str, str] | Sequence[tuple[str, str]] = (),
             number_units: Mapping[str, str] | Sequence[tuple[str, str]] = (),
-            definitions: Mapping[str, Any] | Sequence[tuple[str, Any]] = (),
+            definitions: Mapping[Any, Any] | Sequence[Any] = (),
             visible: Sequence[Any] = (),
+            roots: Mapping[str, Mapping[str, Any]] | Sequence[Any] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -89,11 +98,14 @@ class Sensor:
         put(self, "name", str(self.name))
         name_of(self.name.replace("-", "_"), "sensor")
         put(self, "angles", as_tuple(self.angles, f"sensor {self.name!r}: angles"))
-        labelled = self._labelled()
+        owner, hoist = f"sensor {self.name!r}", Hoist(None, "_" + self.name.replace("-", "_"))
+        labelled = self._labelled(hoist)
         if not labelled:
-            raise ValueError(f"sensor {self.name!r} has no equations")
-        put(self, "definitions", definitions_of(self.definitions, f"sensor {self.name!r}"))
-        put(self, "visible", tuple(text_of(rule) for rule in as_tuple(self.visible, f"sensor {self.name!r}: visible")))
+            raise ValueError(f"{owner} has no equations")
+        definitions = definitions_of(self.definitions, owner, hoist, self.roots)
+        put(self, "visible", tuple(hoist.text(rule) for rule in as_tuple(self.visible, f"{owner}: visible")))
+        put(self, "definitions", in_order((*definitions, *hoist.found), owner))
+        put(self, "roots", ())
         put(self, "components", tuple(labelled))
         put(self, "equations", tuple(labelled.values()))
         units = dict(self.units)
@@ -110,12 +122,12 @@ class Sensor:
         put(self, "number_units", tuple((str(n), str(u)) for n, u in dict(self.number_units).items()))
         put(self, "units", tuple((c, units.get(c, "rad" if c in self.angles else "")) for c in labelled))
 
-    def _labelled(self) -> dict[str, str]:
+    def _labelled(self, hoist: Hoist) -> dict[str, str]:
         """Component names with the text of their equations."""
         if isinstance(self.equations, Mapping):
-            return {name_of(k, "component"): text_of(v) for k, v in self.equations.items()}
+            return {name_of(k, "component"): hoist.text(v) for k, v in self.equations.items()}
         given: Sequence[Any] = [self.equations] if isinstance(self.equations, str) else list(self.equations)
-        return dict(zip(self._labels(len(given)), map(text_of, given), strict=True))
+        return dict(zip(self._labels(len(given)), map(hoist.text, given), strict=True))
 
     def _labels(self, count: int) -> tuple[str, ...]:
         """Names for equations given without: the sensor's own, the angles' where all are angles, else numbered."""
@@ -138,4 +150,11 @@ class Sensor:
     @cached_property
     def free_names(self) -> frozenset[str]:
         """All names in the equations and rules that the sensor does not define itself."""
-        return needed((*self.equations, *self.visible), self.definitions) - {name for name, _ in self.definitions}
+        own = frozenset({STATION_TABLE} if STATION in self.calls else ())
+        texts = (*self.equations, *self.visible)
+        return own | needed(texts, self.definitions) - {n for d in self.definitions for n in d.provides}
+
+    @cached_property
+    def calls(self) -> frozenset[str]:
+        """Names of the functions from outside that its equations call."""
+        return frozenset(call.function for d in self.definitions for call in d.calls)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from piazzi.model import Model, Parameter, Sensor
+from piazzi.model.definitions import Definition
 from piazzi.problem.parts import Gaussian, Station
 from piazzi.text import nearest
 
@@ -61,8 +62,9 @@ def _plain(name: str) -> str:
 
 def _free(name: str, model: Model) -> str:
     """The name, with a number behind it where it is taken."""
-    taken = {*model.moving, *model.parameter_names, *(name for name, _ in model.definitions)}
-    taken |= {name for sensor in model.sensors for name in (*sensor.free_names, *(d for d, _ in sensor.definitions))}
+    taken = {*model.moving, *model.parameter_names, *(n for d in model.definitions for n in d.provides)}
+    for sensor in model.sensors:
+        taken |= {*sensor.free_names, *(n for d in sensor.definitions for n in d.provides)}
     return next(n for n in (name, *(f"{name}_{i}" for i in range(2, len(taken) + 3))) if n not in taken)
 
 
@@ -75,10 +77,16 @@ def _extended(model: Model, sensor: Sensor, station: Station, names: Mapping[str
     label = next(n for n in (base, *(f"{base}-{i}" for i in range(2, len(taken) + 3))) if n not in taken)
     equations = {c: _renamed(e, names) for c, e in zip(sensor.components, sensor.equations, strict=True)}
     left = {name: unit for name, unit in units.items() if name not in names}
-    definitions = {name: _renamed(e, names) for name, e in sensor.definitions}
+    definitions = tuple(_with_names(d, names) for d in sensor.definitions)
     visible = [_renamed(rule, names) for rule in sensor.visible]
     copy = Sensor(label, equations, sensor.angles, dict(sensor.units), left, definitions, visible)
     return replace(model, parameters=(*model.parameters, *constants), sensors=(*model.sensors, copy))
+
+
+def _with_names(d: Definition, names: Mapping[str, str]) -> Definition:
+    """The definition with other names for some that its texts use."""
+    inner = tuple(_with_names(own, names) for own in d.inner)
+    return replace(d, texts=tuple(_renamed(text, names) for text in d.texts), inner=inner)
 
 
 def _renamed(equation: str, names: Mapping[str, str]) -> str:

@@ -12,7 +12,8 @@ from piazzi.expressions import evaluate
 from piazzi.kernels import Integrator, KernelSpec
 from piazzi.kernels.bundle import Given
 from piazzi.model import Model
-from piazzi.model.definitions import with_values
+from piazzi.model.functions import STATION
+from piazzi.model.values import with_values
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.parts import Station
 
@@ -72,9 +73,11 @@ def measurement_jacobian(spec: KernelSpec, sensor: int, numbers: Array, m: int, 
     return out[0] if one else out
 
 
-def singular_equation(model: Model, stations: Iterable[Station], numbers: Mapping[str, float], t: float) -> str:
+def singular_equation(
+    model: Model, stations: Iterable[Station], numbers: Mapping[str, float], t: float, functions: Mapping[str, Any]
+) -> str:
     """A line naming the first equation without a finite value at these states and parameters, or "" where all have one."""
-    values = with_values({**numbers, "t": t, "dt": 1.0}, model.definitions)
+    values = with_values({**numbers, "t": t, "dt": 1.0}, model.definitions, functions=functions, model=model)
     at = ", ".join(f"{name} = {numbers[name]:g}" for name in model.names)
     for state, equation in zip(model.states, model.dynamics, strict=True):
         if not np.isfinite(evaluate(equation, values)):
@@ -82,7 +85,8 @@ def singular_equation(model: Model, stations: Iterable[Station], numbers: Mappin
     for station in stations:
         sensor = model.sensor(station.sensor)
         for component, equation in zip(sensor.components, sensor.equations, strict=True):
-            here = with_values(values | dict(station.numbers), sensor.definitions)
+            there = dict(functions) | {STATION: station.place}
+            here = with_values(values | dict(station.numbers), sensor.definitions, functions=there, model=model)
             if not np.isfinite(evaluate(equation, here)):
                 return f"component {component!r} of station {station.name!r} has no finite value at the prior mean ({at})"
     return ""

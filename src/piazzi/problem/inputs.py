@@ -91,6 +91,7 @@ def prepare(problem: Problem, tracking: Tracking) -> Inputs:
     if kept is None or kept[0] is not problem:
         station = tracking.stations_of(problem)
         start, count, scale = problem.intervals(tracking.times)
+        problem.cover(min(start, float(tracking.times[0])), float(tracking.times[-1]))
         z = tracking.padded(problem.model.width)
         _check_resolved(problem, tracking, station, z)
         inputs = Inputs(tracking.times, start, count, scale, tracking.first_row, z, station)

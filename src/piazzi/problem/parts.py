@@ -111,6 +111,7 @@ class Station(Locked):
     certain is a ``Gaussian(mean, variance)``: it is estimated with the states, under its own name and the station's
     (``bias`` of station ``north`` is ``bias_north``), or, where `considered` names it, inflates the covariance only.
     `schedule` says when it measures in simulation, beside the sensor's rules of what is visible.
+    `place` is where a station stands whose sensor calls ``station(t)``: a table of position and velocity over time.
     """
 
     name: str
@@ -119,6 +120,7 @@ class Station(Locked):
     numbers: Mapping[str, Any] = field(default_factory=dict)
     considered: Sequence[str] = ()
     schedule: Schedule | None = None
+    place: Any = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,10 @@ import numpy as np
 
 from piazzi.kernels import Discrete, Integrator, Kepler, KernelSpec, RungeKutta4
 from piazzi.kernels.bundle import Belief, Given
+from piazzi.kernels.outside import outside_fragments
 from piazzi.model import Model
-from piazzi.problem import evaluation, manoeuvres
+from piazzi.model.functions import STATION_TABLE
+from piazzi.problem import evaluation, manoeuvres, outside
 from piazzi.problem.checks import Array, check_span, covariance, finite_vector, frozen, lock, numeric
 from piazzi.problem.constants import with_station_constants
 from piazzi.problem.epochs import check_near, epoch_given
@@ -49,6 +51,8 @@ class Problem:
         Sudden changes of the state, applied by every estimator and in simulation.
     epoch : Epoch, or what one is made of, optional
         The instant of time zero: all times are seconds of TT past it, and stay within 1e8 s.
+    functions : mapping of name to function from outside
+        The data of the model's functions, such as ``{"field": earth.Gravity("EGM2008", degree=20)}``.
 
     Raises
     ------
@@ -67,6 +71,7 @@ class Problem:
     name: str = ""
     manoeuvres: Sequence[Manoeuvre] = ()
     epoch: Any = None
+    functions: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -75,6 +80,7 @@ class Problem:
         put(self, "model", model)
         put(self, "stations", stations)
         put(self, "parameters", parameters)
+        put(self, "functions", outside.checked_functions(self.functions, model))
         put(self, "process_noise", self._noise(self.process_noise))
         put(self, "stations", self._stations())
         put(self, "parameters", self._parameters())
@@ -92,13 +98,13 @@ class Problem:
             check_two_body(self.model, self.integrator, self._values())
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the specifications of kernels, which this process shares among problems."""
-        return {name: value for name, value in self.__dict__.items() if name != "specs"}
+        """Without the specifications of kernels, which this process shares, and without blocks of data."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("specs", "_told")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Nothing can be written into a copy either; the truth is the user's own, as it was given."""
         self.__dict__.update(state)
-        lock({name: value for name, value in state.items() if name not in ("model", "truth")})
+        lock({name: value for name, value in state.items() if name not in ("model", "truth", "functions")})
 
     # ---- checks --------------------------------------------------------------------------------------------------
 
@@ -128,11 +134,17 @@ class Problem:
                 raise ValueError(f"two stations are called {station.name!r}")
             what = f"measurement noise R of station {station.name!r}"
             noise = covariance(station.noise, sensor.width, what, sensor.components, definite=True)
-            out.append(Station(station.name, station.sensor, noise, self._numbers(station), schedule=station.schedule))
-        return tuple(out)
+            out.append(replace(station, noise=noise, numbers=self._numbers(station)))
+        tables = outside.station_numbers(self.model, [s.place for s in out])
+        return tuple(replace(s, numbers={**s.numbers, **table}) for s, table in zip(out, tables, strict=True))
 
     def _numbers(self, station: Station) -> dict[str, float]:
         wanted = self.model.numbers(self.model.sensor(station.sensor))
+        if STATION_TABLE in wanted and station.place is None:
+            raise ValueError(f"station {station.name!r} has no place, which its sensor {station.sensor!r} needs: give place=")
+        if STATION_TABLE in wanted:
+            wanted = tuple(name for name in wanted if name != STATION_TABLE)
+            station = replace(station, numbers={k: v for k, v in station.numbers.items() if k != STATION_TABLE})
         for name in station.numbers:
             if name not in wanted:
                 raise ValueError(
@@ -175,7 +187,7 @@ class Problem:
 
     def _check_regular(self) -> None:
         """Refuse a prior mean at which an equation has no value, such as the centre of attraction."""
-        where = evaluation.singular_equation(self.model, self.stations, self._values(), self.prior_time or 0.0)
+        where = evaluation.singular_equation(self.model, self.stations, self._values(), self.prior_time or 0.0, self.functions)
         if where:
             raise ValueError(where)
 
@@ -218,10 +230,46 @@ class Problem:
         values = [self.parameters[name] for name in self.model.given]
         return frozen([v.mean[0] if isinstance(v, Gaussian) else v for v in values] or [0.0])
 
-    @cached_property
+    @property
     def given_bundle(self) -> Given:
-        """What kernels are told of the model."""
-        return Given(parameters=self.given, manoeuvres=frozen(manoeuvres.packed(self.manoeuvres, self.model)))
+        """What kernels are told of the model; data of functions from outside reach as far as `cover` was asked for."""
+        told = self.__dict__.get("_told")
+        return told[2] if told else self._tell(self.prior_time or 0.0, self.prior_time or 0.0)
+
+    def cover(self, first: float, last: float) -> bool:
+        """Have data of the functions from outside for these times (s); True where what kernels are told has changed.
+
+        Raises
+        ------
+        ValueError
+            Where a function has no values at some of them.
+        """
+        if self._recipes:
+            told = self.__dict__.get("_told")
+            if not told or not told[0] <= first <= last <= told[1]:
+                self._tell(min(first, told[0]) if told else first, max(last, told[1]) if told else last)
+                return True
+        return False
+
+    def given_over(self, first: float, last: float) -> Given:
+        """What kernels are told of the model, with data for these times (s); raises ValueError as `cover` does."""
+        self.cover(first, last)
+        return self.given_bundle
+
+    def _tell(self, first: float, last: float) -> Given:
+        outside.check_span(self.functions, first, last)
+        begin, end = outside.days(first, last)
+        given = Given(
+            parameters=self.given,
+            manoeuvres=frozen(manoeuvres.packed(self.manoeuvres, self.model)),
+            data=outside.block_of(self._recipes, begin, end),
+        )
+        self.__dict__["_told"] = begin, end, given
+        return given
+
+    @cached_property
+    def _recipes(self) -> tuple[outside.Recipe, ...]:
+        return outside.recipes_of(self.model, self.functions, [s.place for s in self.stations])
 
     @property
     def prior_bundle(self) -> Belief:
@@ -290,7 +338,7 @@ class Problem:
         key = (fragments, lanes)
         spec = self.specs.get(key)
         if spec is None:
-            parts = evaluation.fragments_of(
+            parts = outside_fragments(self.model) + evaluation.fragments_of(
                 fragments,
                 self.integrator,
                 manoeuvres=bool(self.manoeuvres),
@@ -366,24 +414,30 @@ class Problem:
 
     def dynamics(self, x: Any, t: Any = 0.0) -> Array:
         """dx/dt at one state (n,) or many (K, n), same shape."""
-        return evaluation.rates(self.spec("transition", "rates"), "evaluate_dynamics", self.given_bundle, x, t)
+        return evaluation.rates(self.spec("transition", "rates"), "evaluate_dynamics", self._given_at(t), x, t)
 
     def dynamics_jacobian(self, x: Any, t: Any = 0.0) -> Array:
         """F = df/dx at one state (n, n) or many (K, n, n)."""
-        return evaluation.rates(self.spec("transition", "rates"), "evaluate_dynamics_jacobian", self.given_bundle, x, t)
+        return evaluation.rates(self.spec("transition", "rates"), "evaluate_dynamics_jacobian", self._given_at(t), x, t)
 
     def step(self, x: Any, dt: float, t: Any = 0.0) -> tuple[Array, Array]:
         """The state `dt` seconds later and the derivative of that step, shapes (n,), (n, n) or (K, n), (K, n, n)."""
         assert self.integrator is not None
-        return evaluation.step(self.spec("transition", "functions"), self.integrator, self.given_bundle, x, dt, t)
+        return evaluation.step(self.spec("transition", "functions"), self.integrator, self._given_at(t, dt), x, dt, t)
 
     def measure(self, station: str, x: Any, t: Any = 0.0) -> Array:
         """Noiseless measurement h of a station, (m,) or (K, m)."""
-        return evaluation.measure(*self._measured(station), self.given_bundle, x, t)
+        return evaluation.measure(*self._measured(station), self._given_at(t), x, t)
 
     def measurement_jacobian(self, station: str, x: Any, t: Any = 0.0) -> Array:
         """H = dh/dx of a station, (m, n) or (K, m, n)."""
-        return evaluation.measurement_jacobian(*self._measured(station), self.given_bundle, x, t)
+        return evaluation.measurement_jacobian(*self._measured(station), self._given_at(t), x, t)
+
+    def _given_at(self, t: Any, dt: float = 0.0) -> Given:
+        times = numeric(t, "time").reshape(-1)
+        if not times.size or not np.isfinite(times).all() or not isfinite(dt):
+            return self.given_bundle  # whoever reads the times says what is wrong with them
+        return self.given_over(float(times.min() + min(dt, 0.0)), float(times.max() + max(dt, 0.0)))
 
     def _measured(self, station: str) -> tuple[KernelSpec, int, Array, int]:
         """Compiled module, index of the sensor, own numbers and number of components of a station."""

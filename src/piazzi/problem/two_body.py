@@ -9,7 +9,7 @@ from math import hypot, isclose
 from piazzi.expressions import evaluate
 from piazzi.kernels import Kepler
 from piazzi.model import Model
-from piazzi.model.definitions import with_values
+from piazzi.model.values import with_values
 from piazzi.text import nearest
 
 # where equations are compared, in units of the prior's distance: near and far, so that forces of any reach show

@@ -105,6 +105,7 @@ def propagate(
     start, count, scale = actual.intervals(epochs)
     row_station, first_row = np.tile(index, K), np.arange(K + 1, dtype=np.int64) * len(index)
     states, z = np.empty((K, n)), np.empty((K * len(index), M))
+    actual.cover(start, float(epochs[-1]))
     library = kernels.load(actual.spec("transition", actual.noise_fragment, "simulate"))
     run, p, measured, _ = Inputs(epochs, start, count, scale, first_row, z, row_station).bundles(actual)
     library.run_simulation(run, p, measured, first, w, np.empty((n, n)), states)

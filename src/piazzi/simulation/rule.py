@@ -8,6 +8,7 @@ import numpy as np
 
 from piazzi.expressions import check, evaluate_arrays
 from piazzi.model.definitions import needed
+from piazzi.model.values import with_arrays
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 
@@ -36,14 +37,14 @@ class Rule:
         self._names = model.names
         values = {name: actual.parameters[name] for name in model.given}
         self._given = {name: float(v.mean[0]) if isinstance(v, Gaussian) else float(v) for name, v in values.items()}
-        known = {*self._names, *self._given}
+        known = {*self._names, *self._given} | {name for d in model.definitions for name in d.provides}
+        used = needed(self._equations, model.definitions)
         self._definitions = [
-            (name, text)
-            for name, text in model.definitions
-            if needed([text], model.definitions) <= known | {n for n, _ in model.definitions}
+            d for d in model.definitions if used & set(d.names) and needed(d.texts, model.definitions) <= known
         ]
+        self._functions = actual.functions
         for text in self._equations:
-            check(text, [*self._names, *self._given, *(name for name, _ in self._definitions)])
+            check(text, [*self._names, *self._given, *(name for d in self._definitions for name in d.names)])
 
     def __str__(self) -> str:
         return " and ".join(f"{text} > 0" for text in self._equations)
@@ -52,8 +53,8 @@ class Rule:
         """For each of the states (M, n), whether all equations are above zero there, (M,); not where one has no value."""
         out = np.ones(len(x), dtype=bool)
         values = {**self._given, **dict(zip(self._names, x.T, strict=True))}
-        for name, text in self._definitions:
-            values[name] = evaluate_arrays(text, values)
+        wanted = {name for d in self._definitions for name in d.names}
+        values = with_arrays(values, wanted, tuple(self._definitions), functions=self._functions)
         for text in self._equations:
             out &= np.asarray(evaluate_arrays(text, values)) > 0
         return out

@@ -8,6 +8,8 @@ import numpy as np
 
 from piazzi.expressions import evaluate_arrays
 from piazzi.model.definitions import TIME, Definitions, needed
+from piazzi.model.functions import STATION
+from piazzi.model.values import with_arrays
 from piazzi.problem import Gaussian, Problem, Station
 from piazzi.problem.checks import Array
 
@@ -43,10 +45,9 @@ def _visible(problem: Problem, station: Station, values: dict[str, Array | float
     if not sensor.visible:
         return True
     layers: tuple[Definitions, ...] = (problem.model.definitions, sensor.definitions)
-    known, wanted = {**values, **station.numbers}, needed(sensor.visible, *layers)
-    for name, text in (pair for layer in layers for pair in layer):
-        if name in wanted:
-            known[name] = evaluate_arrays(text, known)
+    functions = {**problem.functions, STATION: station.place}
+    wanted = needed(sensor.visible, *layers)
+    known = with_arrays({**values, **station.numbers}, wanted, *layers, functions=functions)
     return np.logical_and.reduce([np.asarray(evaluate_arrays(text, known)) > 0 for text in sensor.visible])  # type: ignore[no-any-return]
 
 

@@ -86,7 +86,8 @@ class Layout:
                 first_row=self.first_row,
                 Q=moving.process_noise.covariance,
             )
-            kept = self.__dict__["_bundles"] = moving, (run, moving.given_bundle, self._stations(moving))
+            given = moving.given_over(start, float(self.times[-1]))
+            kept = self.__dict__["_bundles"] = moving, (run, given, self._stations(moving))
         return kept[1]
 
     def _stations(self, moving: Problem) -> Stations:

@@ -1,0 +1,117 @@
+"""Values of definitions at given numbers, in Python: for checks at the door, not for kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from math import isfinite, nan
+from typing import Any
+
+from piazzi.expressions import evaluate, evaluate_arrays
+from piazzi.model.definitions import TIME, Definition, Definitions, needed
+from piazzi.model.functions import AT, ROOT
+
+MOST_ITERATIONS = 50
+
+
+def with_values(
+    values: Mapping[str, float], *layers: Definitions, functions: Mapping[str, Any] | None = None, model: Any = None
+) -> dict[str, float]:
+    """The values with those of the definitions beside them; a definition whose own names have no value is left out.
+
+    `functions` are those from outside, by name, each with its `value(*arguments)`; `model` is for the state at another instant.
+    """
+    out = dict(values)
+    for layer in layers:
+        for d in layer:
+            if d.needs <= out.keys():
+                _define(d, out, functions or {}, model)
+    return out
+
+
+def with_arrays(
+    values: Mapping[str, Any], wanted: Collection[str], *layers: Definitions, functions: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """As `with_values`, of arrays of numbers that go together, for the definitions that are wanted.
+
+    Raises
+    ------
+    ValueError
+        For a root, or the state at another instant, which have no values here.
+    """
+    import numpy as np
+
+    out = dict(values)
+    for d in (d for layer in layers for d in layer if set(d.provides) & set(wanted)):
+        if d.function in (ROOT, AT):
+            raise ValueError(f"{d.names[0]!r} is {d.function}(...), which a rule cannot use: write it with the states of now")
+        arguments = [evaluate_arrays(text, out) for text in d.texts]
+        if d.function:
+            shape = np.broadcast_shapes(*map(np.shape, arguments))
+            rows = zip(*(np.broadcast_to(a, shape).reshape(-1).tolist() for a in arguments), strict=True)
+            found = np.array([(functions or {})[d.function].value(*row) for row in rows], dtype=float)
+            out.update((name, found[:, i].reshape(shape)) for i, name in enumerate(d.names))
+        else:
+            out[d.names[0]] = arguments[0]
+    return out
+
+
+def _define(d: Definition, out: dict[str, float], functions: Mapping[str, Any], model: Any) -> None:
+    if not d.function:
+        out[d.names[0]] = evaluate(d.texts[0], out)
+    elif d.function == ROOT:
+        _solve(d, out, functions, model)
+    elif d.function == AT:
+        offset = evaluate(d.texts[0], out)
+        out.update(zip(d.names, _elsewhen(out, offset, functions, model), strict=False))
+    elif d.function in functions:
+        arguments = [evaluate(text, out) for text in d.texts]
+        out.update(zip(d.names, map(float, functions[d.function].value(*arguments)), strict=False))
+
+
+def _solve(d: Definition, out: dict[str, float], functions: Mapping[str, Any], model: Any) -> None:
+    """A root by the secant method; NaN where that does not arrive."""
+    name, (equation, start) = d.names[0], d.texts
+
+    def residual(tau: float) -> float:
+        out[name] = tau
+        for inner in d.inner:
+            _define(inner, out, functions, model)
+        return evaluate(equation, out)
+
+    before = evaluate(start, out)
+    g_before = residual(before)
+    tau = before + g_before
+    for _ in range(MOST_ITERATIONS):
+        g = residual(tau)
+        if g == 0.0:
+            return
+        if not isfinite(g) or g == g_before:
+            break
+        before, g_before, tau = tau, g, tau - g * (tau - before) / (g - g_before)
+        if abs(tau - before) <= 1e-12 * abs(tau):
+            residual(tau)
+            return
+    residual(nan)
+
+
+def _elsewhen(values: Mapping[str, float], offset: float, functions: Mapping[str, Any], model: Any) -> Sequence[float]:
+    """States at t + offset by a few steps of the classical Runge-Kutta method."""
+    states, steps = model.states, 4
+    x, t, h = [values[s] for s in states], values.get(TIME, 0.0), offset / steps
+
+    def rates(x: Sequence[float], t: float) -> list[float]:
+        here = {**values, **dict(zip(states, x, strict=True)), TIME: t}
+        wanted = needed(model.dynamics, model.definitions)
+        for d in model.definitions:
+            if set(d.provides) & wanted:
+                _define(d, here, functions, model)
+        return [evaluate(e, here) for e in model.dynamics]
+
+    for i in range(steps):
+        now = t + i * h
+        k1 = rates(x, now)
+        k2 = rates([a + h / 2 * k for a, k in zip(x, k1, strict=True)], now + h / 2)
+        k3 = rates([a + h / 2 * k for a, k in zip(x, k2, strict=True)], now + h / 2)
+        k4 = rates([a + h * k for a, k in zip(x, k3, strict=True)], now + h)
+        x = [a + h / 6 * (p + 2 * q + 2 * r + s) for a, p, q, r, s in zip(x, k1, k2, k3, k4, strict=True)]
+    return x

@@ -1,0 +1,97 @@
+"""Functions from outside as a problem has them: their recipes, checked, and the block of data that kernels read.
+
+The block begins with the position of each function's own data, by the number that the model gives the function; behind the
+functions come the tables of stations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import ceil, floor
+from typing import Any, Protocol
+
+import numpy as np
+
+from piazzi.model import Model
+from piazzi.model.functions import STATION_TABLE, Signature, signature_of
+from piazzi.problem.checks import Array, frozen
+from piazzi.text import nearest
+
+DAY = 86400.0
+MARGIN = 3600.0  # seconds that a block reaches beyond what is asked for
+
+
+class Recipe(Protocol):
+    """What makes the data of a function from outside."""
+
+    @property
+    def signature(self) -> Signature: ...
+    @property
+    def checksum(self) -> str: ...
+    @property
+    def span(self) -> tuple[float, float] | None: ...
+    def block(self, first: float, last: float) -> Array: ...
+    def value(self, *arguments: float) -> Sequence[float]: ...
+
+
+def checked_functions(given: Mapping[str, Any], model: Model) -> dict[str, Recipe]:
+    """The functions by name, in the model's order; raises ValueError where they are not those of the model."""
+    known = dict(model.functions)
+    for name in given:
+        if name not in known:
+            raise ValueError(f"function {name!r} is not one of the model's{nearest(name, known)}")
+    out = {}
+    for name, signature in known.items():
+        if name not in given:
+            raise ValueError(f"function {name!r} of the model has no data: give functions = {{{name!r}: ...}}")
+        if signature_of(given[name], name) != signature:
+            raise ValueError(
+                f"function {name!r} is {given[name].signature.function} with {given[name].signature.arguments} arguments, but "
+                f"the model was made for {signature.function} with {signature.arguments}"
+            )
+        if not hasattr(given[name], "block"):
+            raise ValueError(f"function {name!r} is a signature only: the problem needs its data")
+        out[name] = given[name]
+    return out
+
+
+def recipes_of(model: Model, functions: Mapping[str, Recipe], places: Sequence[Any]) -> tuple[Recipe, ...]:
+    """One recipe for each number: of the functions, then of the stations that have a place."""
+    first: dict[int, Recipe] = {}
+    for name, slot in model.slots.items():
+        first.setdefault(slot, functions[name])
+    return (*first.values(), *(place for place in places if place is not None))
+
+
+def station_numbers(model: Model, places: Sequence[Any]) -> list[dict[str, float]]:
+    """For each station the number that says which table is its own, where it has a place."""
+    number, out = len(set(model.slots.values())), []
+    for place in places:
+        out.append({} if place is None else {STATION_TABLE: float(number)})
+        number += place is not None
+    return out
+
+
+def days(first: float, last: float) -> tuple[float, float]:
+    """The span that a block is made for."""
+    return floor((first - MARGIN) / DAY) * DAY, ceil((last + MARGIN) / DAY) * DAY
+
+
+def check_span(functions: Mapping[str, Any], first: float, last: float) -> None:
+    """Raise ValueError where a function has no values at some of these times."""
+    for name, recipe in functions.items():
+        if recipe.span is not None and not recipe.span[0] <= first <= last <= recipe.span[1]:
+            when = first if first < recipe.span[0] else last
+            raise ValueError(
+                f"{name!r} has values from t = {recipe.span[0]:g} to {recipe.span[1]:g} s, and t = {when:g} s is outside"
+            )
+
+
+def block_of(recipes: Sequence[Recipe], first: float, last: float) -> Array:
+    """The block for a span of times."""
+    parts, places, at = [], [], len(recipes)
+    for recipe in recipes:
+        places.append(float(at))
+        parts.append(np.asarray(recipe.block(first, last), dtype=float))
+        at += len(parts[-1])
+    return frozen(np.concatenate([places, *parts])) if recipes else frozen([0.0])
