@@ -39,6 +39,22 @@ def tracking_of(problem):
     return pz.simulate(problem, np.cumsum(np.random.default_rng(3).uniform(0.1, 0.4, 12)), np.random.default_rng(4))
 
 
+def observations():
+    epoch, segment = pz.Epoch("2020-01-01 UTC"), pz.formats.Segment("UTC", corrections=(pz.formats.Correction("range", 1.0),))
+    return pz.Observations(
+        epoch=epoch, t=[0.0, 1.0], value=[1.0, 2.0], kinds=("range",), kind=0, segments=(segment,), participants=("A",),
+        sigma=[1.0, np.nan], extra={"catalogue": np.array(["U", "V"]), "band": np.array("r")}, place=0,
+        places=[[1.0, 2.0, 3.0]],
+    )  # fmt: skip
+
+
+def arc():
+    return pz.formats.Arc(
+        epoch=pz.Epoch("2020-01-01 UTC"), t=[0.0, 1.0], position=np.ones((2, 3)), covariance_frames=("RTN",),
+        covariance_t=[0.0], covariance=np.eye(6)[None], frame="GCRF",
+    )  # fmt: skip
+
+
 def samples():
     """One of every public class, by its name."""
     problem = radar()
@@ -79,6 +95,7 @@ def samples():
     ]
     parts = [problem.model, problem.prior, problem.process_noise, problem.stations[0], problem.model.sensors[0]]
     others = [pz.Manoeuvre(1.0, [1.0, 0.0], 0.1), pz.Parameter("mu"), pz.Truth([1.0, 0.0]), pz.Epoch("2020-01-01 UTC")]
+    others += [observations(), pz.Ephemeris(arcs=(arc(),))]
     results = [estimate, estimate.predict([9.0]), pz.compare(problem, tracking, {"ekf": settings[1]}), prediction]
     results += [pz.observability(problem, tracking), pz.windows(problem, tracking, [2, 3])]
     results += [pz.update(problem, prediction, "east", [3.0]), pz.Study.of("b612-range", runs=2)]

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from piazzi.loading import load
     from piazzi.model import Model, Parameter, Sensor
     from piazzi.orbit import kepler_transition, propagate_kepler
+    from piazzi.orbit.difference import difference
     from piazzi.present.report import write_report
     from piazzi.problem import (
         Gaussian,
@@ -78,7 +79,7 @@ _WHERE = {
         "piazzi.formats": "Ephemeris Observations read_ephemeris read_tracking",
         "piazzi.problem": "Gaussian Manoeuvre Pass Problem ProcessNoise Schedule Station Tracking Truth passes "
         "with_gauss_markov",
-        "piazzi.orbit": "kepler_transition propagate_kepler",
+        "piazzi.orbit": "difference kepler_transition propagate_kepler",
         "piazzi.simulation": "simulate",
         "piazzi.estimate.bank": "Bank",
         "piazzi.estimate.batch": "BatchLeastSquares",
@@ -117,8 +118,8 @@ __all__ = [
     "Gaussian", "Heun", "Huber", "Integrator", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre",
     "Midpoint", "Model", "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise",
     "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother",
-    "SquareRootKalmanFilter", "Station", "Study", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter",
-    "Updated", "WindowTrade", "choose_substeps", "compare", "earth", "formats", "kepler_transition", "load",
+    "SquareRootKalmanFilter", "Station", "Study", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated",
+    "WindowTrade", "choose_substeps", "compare", "difference", "earth", "formats", "kepler_transition", "load",
     "observability", "orbit", "passes", "predict", "propagate_kepler", "read_ephemeris", "read_store", "read_tracking",
     "simulate", "step_warning", "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip

@@ -118,7 +118,7 @@ def test_covariances_have_seventeen_digits_their_axes_and_a_cholesky_factor(data
 
 def test_what_cannot_be_written_is_said(data_dir):
     arc = pz.read_ephemeris(data_dir / "ccsds/odm/oem/OEMExample5.txt").arcs[0]
-    for changed, says in [({"frame": None}, "axes"), ({"scale": None}, "time scale"), ({"centre": None}, "centre")]:
+    for changed, says in [({"frame": None}, "axes"), ({"scale": None}, "time scale"), ({"centre": "\u2028"}, "centre")]:
         with pytest.raises(ValueError, match=f"the {says} of ISS must be known"):
             oem_text(pz.Ephemeris(arcs=(replace(arc, **changed),)))
     with pytest.raises(ValueError, match="positions and velocities"):

@@ -1,13 +1,18 @@
 """Elementary functions of the kernels against wider arithmetic: stated accuracy, the same bits in lanes, all exceptions."""
 
+import ast
 from functools import cache
+from pathlib import Path
 
+import mpmath as mp
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 from piazzi.expressions.functions import TABLE
+from piazzi.kernels.lanes import elementary
 from tests.kernels.test_lanes import call
+from tests.references import minimax
 
 W = 4
 ONE_OPERATION = {"sqrt", "fabs", "minimum", "maximum"}
@@ -109,3 +114,33 @@ def test_exceptions_are_those_of_the_c_library(name, w):
     assert_array_equal(np.isinf(got), np.isinf(expected))
     finite = np.isfinite(expected)
     np.testing.assert_allclose(got[finite], expected[finite], rtol=1e-15, atol=1e-323)
+
+
+@pytest.mark.parametrize("name", ["sine_series", "cosine_series", "arc_series", "exponential_series", "logarithm_series"])
+def test_the_coefficients_are_those_of_a_minimax_fit(name):
+    """The polynomial is the one of `minimax` to what rounding of its coefficients to doubles may change."""
+    source = ast.parse(Path(elementary.__file__).read_text(encoding="utf-8"))
+    calls = [n for n in ast.walk(source) if isinstance(n, ast.Call) and getattr(n.func, "id", "") == "polynomial"]
+    found = {ast.literal_eval(c.args[0]): [ast.literal_eval(a) for a in c.args[1:]] for c in calls}[name]
+    with mp.workdps(40):
+        fit = minimax.fits()[name]
+        made = minimax.minimax(fit)
+        assert len(made) == len(found)
+        apart = [mp.mpf(have) - want for have, want in zip(found, made, strict=True)]
+        rounding = [mp.mpf(np.spacing(abs(have))) / 2 for have in found]
+        along = [fit.begin + (fit.end - fit.begin) * (i + mp.mpf(1) / 2) / 500 for i in range(500)]
+        allowed = max(abs(fit.relative(z)) * mp.polyval(rounding[::-1], abs(z)) for z in along)
+        assert max(abs(fit.relative(z) * mp.polyval(apart[::-1], z)) for z in along) <= allowed
+
+
+@pytest.mark.parametrize(("name", "exact"), [("QUARTER_TURN", lambda: mp.pi / 2), ("LN2", lambda: mp.log(2))])
+def test_the_parts_of_a_constant_are_its_leading_bits(name, exact):
+    """All parts but the last have 33 bits at most, so that multiples up to 2^20 are exact; the last is what is left."""
+    *leading, last = getattr(elementary, name)
+    with mp.workdps(60):
+        left = exact()
+        for part in leading:
+            mantissa, _ = mp.frexp(part)
+            assert mantissa * 2**33 == mp.floor(mantissa * 2**33)
+            left -= mp.mpf(part)
+        assert last == float(left)

@@ -204,6 +204,26 @@ def test_three_ranges_against_fifty_digits():
     assert iod.three_ranges(ranges, stations)[0][1] is None
 
 
+@pytest.mark.parametrize("count", [2, 3, 6])
+def test_the_best_orbit_through_radar_plots_is_that_of_the_body(count):
+    """Turns and ways around that two positions leave are told apart by range rates, or by a plot between."""
+    r, v = np.array([5900.0, 5800.0, 6700.0]), np.array([-4.4, 4.6, 1.5])
+    period = 2 * np.pi * np.sqrt((1 / (2 / np.linalg.norm(r) - v @ v / MU)) ** 3 / MU)
+    t = np.linspace(0, 2.3 * period, count)
+    V = np.cross([0, 0, 7.2921e-5], SITE[1])
+    position, velocity = iod.propagate_kepler(r, v, MU, t)
+    d = position - SITE[1]
+    rho = np.linalg.norm(d, axis=1)
+    rates = np.sum(d * (velocity - V), axis=1) / rho
+    found = iod.radar(t, rho, d, SITE[1], MU, rates, V)
+    assert len(found) > 6
+    assert found[0].residual < 1e-9
+    assert found[1].residual > 1e-4
+    assert_allclose(found[0].v, v, rtol=1e-9, atol=1e-9)
+    if count > 2:
+        assert_allclose(iod.radar(t, rho, d, SITE[1], MU)[0].v, v, rtol=1e-9, atol=1e-9)
+
+
 def test_printed_answers_of_three_positions():
     r = [[0, 0, 6378.137], [0, -4464.696, -5102.509], [0, 5740.323, 3189.068]]
     assert_allclose(iod.gibbs(r, MU), [0, 5.531148, -5.191806], atol=1e-6)
@@ -361,6 +381,10 @@ def test_directions_in_one_plane_are_refused(method):
         (lambda: iod.gibbs(7000 * np.eye(3), MU), "90 deg out of the plane"),
         (lambda: iod.herrick_gibbs(7000 * np.eye(3), [1, 1, 1], MU), "all three positions are at one time"),
         (lambda: iod.herrick_gibbs(7000 * np.eye(3), [1, 3, 2], MU), "must increase"),
+        (lambda: iod.radar([0], [1], [[1, 0, 0]], SITE[0], MU), "one plot of range, range-rate and direction is four numbers"),
+        (lambda: iod.radar([0, 0], [1, 1], np.eye(3)[:2], SITE[0], MU), "times are 0, 0; they must increase"),
+        (lambda: iod.radar([0, 1], [1, -1], np.eye(3)[:2], SITE[0], MU), "range is -1"),
+        (lambda: iod.radar([0, 1], [1, 1], np.eye(3)[:2], SITE[0], MU, [1]), r"range rates have shape \(1,\)"),
         (lambda: iod.three_ranges([1, 2], np.eye(3)), "two ranges leave a circle"),
         (lambda: iod.three_ranges([1, 2, 3], [[1, 0, 0], [2, 0, 0], [3, 0, 0]]), "on one line"),
         (lambda: iod.three_ranges([0.1, 0.1, 9], np.eye(3)), "do not meet"),

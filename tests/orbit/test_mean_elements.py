@@ -8,7 +8,9 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi import earth
-from piazzi.orbit import orbit_axes, propagate_kepler, read_tle, sgp4_covariance, sgp4_states
+from piazzi.formats import Arc
+from piazzi.formats.tle import tle_text
+from piazzi.orbit import fit_sgp4, orbit_axes, propagate_kepler, read_tle, sgp4_covariance, sgp4_states
 from piazzi.orbit.mean_elements import MU
 
 VANGUARD = """VANGUARD 1
@@ -116,6 +118,65 @@ def test_the_prior_is_positive_definite_and_grows_along_the_track_as_it_says():
     aged = sgp4_covariance(mean, mean.epoch + span)
     R = orbit_axes(*sgp4_states(mean, mean.epoch + span, "GCRF"))
     assert_allclose(np.sqrt(np.diag(R @ aged[:3, :3] @ R.T)), [1000, np.hypot(1000, 2000), 1000], rtol=0.02)
+
+
+def rows_of(mean, dates):
+    r, v = sgp4_states(mean, dates)
+    return Arc(
+        epoch=dates[0], t=np.array([d - dates[0] for d in dates]), position=r, velocity=v, frame="TEME", centre="EARTH",
+        scale="UTC", name="X",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("text", [VANGUARD, ROUND.replace("0001000", "0000000").replace("51.6400", " 0.0000")])
+def test_a_fit_to_states_of_the_theory_gives_its_elements(text):
+    """Circular and equatorial too, where single angles mean nothing: the positions are the same."""
+    mean = read_tle(with_checksums(text) if text is not VANGUARD else text)
+    dates = [mean.epoch + 240.0 * k for k in range(-30, 60)]
+    found = fit_sgp4(rows_of(mean, dates), epoch=mean.epoch, drag=text is VANGUARD)
+    assert found.rms < 1e-3
+    assert_allclose(found.residuals, 0, atol=1e-2)
+    later = mean.epoch + 86400.0
+    assert np.linalg.norm(sgp4_states(found.mean, later)[0] - sgp4_states(mean, later)[0]) < 1.0
+    if text is VANGUARD:
+        for (_, was), (_, value) in zip(mean.elements, found.mean.elements, strict=True):
+            assert value == pytest.approx(was, abs=1e-10)
+        assert float(dict(found.mean.said)["BSTAR"]) == pytest.approx(2.8098e-5, abs=1e-9)
+
+
+def test_fits_to_precise_orbits_are_as_good_as_the_theory_is(data_dir):
+    """A few hundred metres, and better than mean elements that are moved a little in any direction."""
+    for file, name, bound in (("sp3/nsgf.orb.stella.v00.sp3.gz", None, 250), ("sp3/gps_g01_g05_20150505.sp3", "G01", 150)):
+        path = data_dir / "earth" / file
+        found = fit_sgp4(path, object=name)
+        assert found.rms < bound
+        assert pz.difference(path, found.mean, object=name).rms_3d == pytest.approx(found.rms, rel=1e-3)
+        for key, value in found.mean.elements:
+            for change in (-1e-5, 1e-5):
+                moved = dict(found.mean.elements) | {key: value + change * (value if key == "mean_motion" else 1.0)}
+                other = replace(found.mean, elements=tuple(moved.items()))
+                assert pz.difference(path, other, object=name).rms_3d > found.rms
+
+
+def test_what_cannot_be_fitted_is_refused():
+    mean = read_tle(VANGUARD)
+    with pytest.raises(ValueError, match="has 2 rows; 6 mean elements need more"):
+        fit_sgp4(rows_of(mean, [mean.epoch, mean.epoch + 60.0]))
+    with pytest.raises(ValueError, match="has no rows"):
+        fit_sgp4(mean)
+    fast = rows_of(mean, [mean.epoch + 60.0 * k for k in range(9)])
+    with pytest.raises(ValueError, match="these elements are for ellipses"):
+        fit_sgp4(replace(fast, velocity=3 * fast.velocity))
+
+
+def test_two_line_elements_are_written_as_they_were_read():
+    assert tle_text(read_tle(VANGUARD)) == VANGUARD
+    mean = fit_sgp4(rows_of(read_tle(VANGUARD), [read_tle(VANGUARD).epoch + 300.0 * k for k in range(40)])).mean
+    back = read_tle(tle_text(mean))
+    assert_allclose([v for _, v in back.elements], [v for _, v in mean.elements], rtol=0, atol=2e-6)
+    assert abs(back.epoch - mean.epoch) < 1e-3
+    with pytest.raises(ValueError, match="do not fit into two-line elements"):
+        tle_text(replace(mean, elements=(("mean_motion", 10.0), *mean.elements[1:])))
 
 
 def test_a_prior_without_size_is_refused():

@@ -10,7 +10,19 @@ from piazzi import __version__
 from piazzi.cli.options import Group
 from piazzi.text import nearest
 
-COMMANDS = ("demo", "scenarios", "simulate", "estimate", "compare", "study", "windows", "observability", "report", "tracking")
+COMMANDS = (
+    "demo",
+    "scenarios",
+    "simulate",
+    "estimate",
+    "compare",
+    "study",
+    "windows",
+    "observability",
+    "report",
+    "tracking",
+    "difference",
+)
 
 
 class Commands(Group):
@@ -46,6 +58,7 @@ def piazzi() -> None:
       piazzi compare b612-range --with ekf --with graph
       piazzi windows tracking.npz               how long a window has to be
       piazzi observability b612-range-q0        what can be seen, and how well
+      piazzi difference fit.oem truth.sp3       how far two orbits are apart
       piazzi report tracking.npz -o page.html   a self-contained interactive page
       piazzi scenarios list                     what is built in
 

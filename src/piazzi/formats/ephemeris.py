@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piazzi.earth import Epoch
+from piazzi.formats.copying import reduced
 
 Array = np.ndarray[Any, Any]
 
@@ -92,6 +93,9 @@ class Arc:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return reduced(self)
 
     def instant(self, k: int) -> Epoch:
         """When a state is."""

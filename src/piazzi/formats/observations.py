@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piazzi.earth import Epoch
+from piazzi.formats.copying import reduced
 from piazzi.formats.kinds import KINDS, TAGS
 from piazzi.text import nearest
 
@@ -147,7 +148,8 @@ class Observations:
         for name, kind in _INDICES.items():
             put(self, name, _column(name, getattr(self, name), kind, rows))
         put(self, "used", _column("used", self.used, np.bool_, rows))
-        put(self, "places", np.ascontiguousarray(self.places, dtype=float).reshape(-1, 3))
+        put(self, "places", np.array(self.places, dtype=float).reshape(-1, 3))
+        self.places.setflags(write=False)
         columns = {name: _column(name, values, None, rows) for name, values in self.extra.items()}
         put(self, "extra", MappingProxyType(columns))
         for name in self.kinds:
@@ -164,6 +166,9 @@ class Observations:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return reduced(self)
 
     def __getitem__(self, rows: Any) -> Observations:
         """The rows of a mask, a slice or an array of indices, with all names and conventions."""

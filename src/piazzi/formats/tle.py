@@ -112,3 +112,59 @@ def _exponential(name: str, number: int, what: str, text: str) -> float:
 
 def _refuse(name: str, number: int, reason: str) -> NoReturn:
     raise ValueError(f"{name}: line {number}: {reason}")
+
+
+def tle_text(mean: MeanElements) -> str:
+    """Two-line elements of mean elements of SGP4, with a line of the name where there is one.
+
+    Raises
+    ------
+    ValueError
+        Where there is no mean motion, or a value does not fit into its columns.
+    """
+    values, said = dict(mean.elements), dict(mean.said)
+    if "mean_motion" not in values:
+        raise ValueError(f"mean elements of {mean.name or 'the object'} have no mean motion, which two-line elements hold")
+    _, day, seconds, fraction = mean.epoch.reading("UTC")
+    year, since = _year_and_day(day)
+    number = said.get("NORAD_CAT_ID", "").rjust(5, "0")[:5]
+    designator = mean.identifier[2:].replace("-", "", 1) if len(mean.identifier) > 5 else ""
+    part = (seconds + fraction) / _DAY
+    first = (
+        f"1 {number}{said.get('CLASSIFICATION_TYPE', 'U')[:1]} {designator[:8]:<8} {year % 100:02d}{since + part:012.8f} "
+        f"{_small(float(said.get('MEAN_MOTION_DOT', 0.0)))} {_power(float(said.get('MEAN_MOTION_DDOT', 0.0)))} "
+        f"{_power(float(said.get('BSTAR', 0.0)))} {said.get('EPHEMERIS_TYPE', '0')[:1]} {said.get('ELEMENT_SET_NO', '0'):>4}"
+    )
+    degrees = {name: value / _DEGREE for name, value in values.items()}
+    second = (
+        f"2 {number} {degrees['inclination']:8.4f} {degrees['ascending_node'] % 360.0:8.4f} "
+        f"{round(values['eccentricity'] * 1e7):07d} {degrees['argument_of_pericentre'] % 360.0:8.4f} "
+        f"{degrees['mean_anomaly'] % 360.0:8.4f} {values['mean_motion'] * _DAY / (2.0 * np.pi):11.8f}"
+        f"{said.get('REV_AT_EPOCH', '0'):>5}"
+    )
+    for line in (first, second):
+        if len(line) != LENGTH - 1:
+            raise ValueError(f"mean elements of {mean.name or 'the object'} do not fit into two-line elements: {line}")
+    lines = [f"{line}{sum(int(c) if c.isdigit() else c == '-' for c in line) % 10}" for line in (first, second)]
+    return "\n".join([*([mean.name] if mean.name else []), *lines]) + "\n"
+
+
+def _year_and_day(day: float) -> tuple[int, int]:
+    """The year of a day (MJD), and which day of it that is, from 1."""
+    import erfa
+
+    year = int(erfa.jd2cal(2400000.5, day)[0])
+    return year, int(day - erfa.cal2jd(year, 1, 1)[1]) + 1
+
+
+def _small(value: float) -> str:
+    """A number below 1 as `` .00000023``."""
+    return f"{'-' if value < 0 else ' '}{abs(value):.8f}".replace("0.", ".", 1)
+
+
+def _power(value: float) -> str:
+    """A number such as 0.12345e-4 as `` 12345-4``."""
+    if value == 0.0:
+        return " 00000-0"
+    digits, exponent = f"{abs(value):.4e}".split("e")
+    return f"{'-' if value < 0 else ' '}{digits.replace('.', '')}{int(exponent) + 1:+d}"

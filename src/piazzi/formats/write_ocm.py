@@ -44,7 +44,7 @@ def ocm_text(
         For an arc without centre, axes, time scale or velocities, or an unknown keyword of a determination.
     """
     for what, value in (("centre", arc.centre), ("axes", arc.frame), ("time scale", arc.scale)):
-        if not value:
+        if not plain(value or ""):
             raise ValueError(f"the {what} of {arc.name or 'the object'} must be known to write it")
     if np.isnan(arc.position).any() or np.isnan(arc.velocity).any():
         raise ValueError(f"states of {arc.name or 'the object'} must all have positions and velocities to write them")

@@ -37,7 +37,7 @@ def _header(form: str, originator: str, created: str | None) -> list[str]:
 
 def _metadata(arc: Arc | MeanElements) -> Iterator[str]:
     for what, value in (("centre", arc.centre), ("axes", arc.frame), ("time scale", arc.scale)):
-        if not value:
+        if not plain(value or ""):
             raise ValueError(f"the {what} of {arc.name or 'the object'} must be known to write it")
     yield f"OBJECT_NAME = {plain(arc.name) or 'UNKNOWN'}"
     yield f"OBJECT_ID = {plain(arc.identifier) or 'UNKNOWN'}"

@@ -138,10 +138,6 @@ ones: Any
 store_errors: Any
 squared_lanes: Any
 nees_lanes: Any
-# written in fragments/kepler.py
-kepler_motion: Any
-# written in fragments/lambert.py
-lambert_velocities: Any
 # written in fragments/border.py
 rotate: Any
 invert_upper: Any

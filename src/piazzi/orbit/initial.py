@@ -17,9 +17,9 @@ class InitialOrbit:
 
     Attributes
     ----------
-    t : time of the state, that of the middle observation
+    t : time of the state, that of the middle observation (of `radar` the first)
     r, v : (3,) position and velocity from the centre, in the units of what was given
-    ranges : (3,) distances from the observers
+    ranges : (3,) distances from the observers (of `radar` K)
     positions : (3, 3) the body at the three times, as the method has it
     residual : the largest angle, in radians, between a direction observed and that of two-body motion from `r` and `v`
     """

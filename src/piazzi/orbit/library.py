@@ -14,7 +14,7 @@ from piazzi.model import Model, Sensor
 def _spec() -> KernelSpec:
     """They depend on no model; the smallest one stands in its place."""
     nothing = Model(("s",), ("0",), (Sensor("any", ["0"]),), discrete=True)
-    return KernelSpec(nothing, Discrete().scheme, ("kepler", "lambert", "gooding"), 1)
+    return KernelSpec(nothing, Discrete().scheme, ("kepler", "kepler_arcs", "lambert", "lambert_paths", "gooding"), 1)
 
 
 def orbit_library() -> SimpleNamespace:

@@ -6,6 +6,8 @@ vectors across the
 middle one, the three observers, the axis that motion is about, and the times from the first observation to the others.
 """
 
+from piazzi.kernels.fragments.kepler import kepler_motion
+from piazzi.kernels.fragments.lambert_paths import lambert_velocities
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

@@ -1,0 +1,46 @@
+"""How far two orbits are apart, over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piazzi.evaluate.quantities import display_of
+from piazzi.orbit.difference import Difference
+from piazzi.present.colours import STATIONS
+from piazzi.present.figures.style import RC, plain, time_display
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def difference_track(ax: Axes, found: Difference, axis: int) -> Axes:
+    """The difference along one axis, with three sigma of both covariances where there are any."""
+    when = time_display(found.t)
+    hours = (found.t - found.t[0]) * when.factor
+    shown = display_of("m", [float(np.abs(found.position).max())])
+    three = 3.0 * found.sigma[:, axis] * shown.factor
+    if np.isfinite(three).any():
+        ax.fill_between(hours, -three, three, color=STATIONS[axis], alpha=0.15, linewidth=0, label="3 sigma")
+    ax.plot(hours, found.position[:, axis] * shown.factor, color=STATIONS[axis], marker="." if len(hours) < 400 else "")
+    ax.set_ylabel(f"{found.letters[axis]} [{shown.unit}]")
+    return ax
+
+
+def difference_page(found: Difference) -> Figure:
+    """A picture with the three axes below one another."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    style: Any = RC
+    with rc_context(style):
+        figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+        tracks = figure.subplots(3, 1, sharex=True)
+        for axis in range(3):
+            difference_track(tracks[axis], found, axis)
+        start = (found.epoch + float(found.t[0])).to("UTC", digits=3)
+        tracks[2].set_xlabel(f"Time after {start} [{time_display(found.t).unit}]")
+        figure.suptitle(plain(f"{found.names[1]} minus {found.names[0]}"), fontsize=11, x=0.01, ha="left")
+    return figure
