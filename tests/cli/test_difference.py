@@ -27,6 +27,14 @@ def test_json_is_the_contract_and_nothing_else(call, gps, tmp_path):
     assert (tmp_path / "d.png").read_bytes()[:4] == b"\x89PNG"
 
 
+def test_names_of_files_cannot_reach_the_terminal_as_orders(call, gps, tmp_path):
+    evil = tmp_path / "a\x1b[31m.sp3"
+    evil.write_bytes(gps.read_bytes())
+    result = call("difference", evil, gps, "--object", "G01", "--step", "777")
+    assert result.status == 0
+    assert "\x1b" not in result.out
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
 from piazzi.evaluate.quantities import display_of, number
+from piazzi.text import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -59,8 +60,9 @@ class Differing:
                 f"that should hold {100 * sigma['expected_inside']:.4g} %, if the two are independent."
             )
         for orbit in self.found["orbits"]:
+            name = printable(orbit["name"])
             if orbit["method"] in ("Lagrange", "Hermite"):
                 yield (
-                    f"Between rows {orbit['name']} is {orbit['method']}'s polynomial of degree {orbit['degree']}; those of "
+                    f"Between rows {name} is {orbit['method']}'s polynomial of degree {orbit['degree']}; those of "
                     f"the next degrees are up to {number(orbit['error'], 2)} m from it."
                 )
