@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.inputs import prepare
-from piazzi.scenarios import load_scenario, names
+from piazzi.scenarios import Recording, load_scenario, names
 from piazzi.simulation import simulate
 
 KINDS = (".npz", ".nc", ".csv", ".toml")
@@ -23,6 +24,7 @@ def load(
     seed: int = 0,
     scenario: str | os.PathLike[str] | None = None,
     scale: str | None = None,
+    columns: Mapping[str, str] | str | None = None,
 ) -> tuple[Problem, Tracking]:
     """Problem and tracking of a recording, or of a scenario simulated with `seed`.
 
@@ -35,7 +37,9 @@ def load(
     scenario : name or path, optional
         The problem that a ``.csv`` measures.
     scale : UTC, TAI, TT, TDB, TCG, GPS or UT1, optional
-        Of dates in a ``.csv`` that name none.
+        Of dates in a ``.csv`` that name none; default what the scenario's [recording] says.
+    columns : mapping of a name here to a column of the file, or text such as ``"range=RNG[km] week=gps_week sow=gps_tow"``
+        For a ``.csv`` with other names; default what the scenario's [recording] says.
 
     Dates become seconds past the problem's epoch.  One without an epoch, whose prior is at the first measurement, gets that of
     the file.
@@ -50,7 +54,7 @@ def load(
     ValueError
         For an unknown scenario or a file with something wrong in it: what, the value, and where.
     """
-    problem, tracking = _loaded(os.fspath(source), seed, scenario, scale)
+    problem, tracking = _loaded(os.fspath(source), seed, scenario, Recording(_mapping(columns), scale))
     with contextlib.suppress(ValueError):  # estimators say what does not fit
         prepare(problem, tracking)
     return problem, tracking
@@ -69,10 +73,18 @@ def _with_prior_before(text: str, problem: Problem, tracking: Tracking) -> tuple
         raise ValueError(f"{text}: {error}") from None
 
 
-def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, scale: str | None) -> tuple[Problem, Tracking]:
+def _mapping(columns: Mapping[str, str] | str | None) -> Mapping[str, str]:
+    if not isinstance(columns, str):
+        return columns or {}
+    from piazzi.io.naming import parse_columns
+
+    return parse_columns(columns)
+
+
+def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, said: Recording) -> tuple[Problem, Tracking]:
     kind = Path(text).suffix.lower()
-    if scale is not None and kind != ".csv":
-        raise ValueError(f"{text}: --scale is for the dates of a .csv file")
+    if said != Recording() and kind != ".csv":
+        raise ValueError(f"{text}: {'--columns' if said.columns else '--scale'} is for a .csv file")
     if scenario is not None and kind != ".csv":
         raise ValueError(f"{text}: only a .csv file is loaded with a scenario; this one holds its own problem")
     if kind == ".npz":
@@ -88,8 +100,9 @@ def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, scale
 
         if scenario is None:
             raise ValueError(f"{text}: name the scenario that this .csv file measures: {', '.join(names())}, or a path")
-        problem = load_scenario(scenario).problem
-        tracking = read_csv(text, problem, scale)
+        found = load_scenario(scenario)
+        problem, usual = found.problem, found.recording
+        tracking = read_csv(text, problem, said.scale, said.columns, usual)
         if problem.epoch is None and tracking.epoch is not None:
             problem = replace(problem, epoch=tracking.epoch)
         return _with_prior_before(text, problem, tracking)

@@ -11,6 +11,7 @@ from piazzi.cli import options, results
 if TYPE_CHECKING:
     from piazzi.evaluate import Comparison
     from piazzi.present.report import Tab
+    from piazzi.scenarios import Recording
 
 DEFAULT = ("ekf", "graph", "window:100")
 
@@ -22,7 +23,7 @@ DEFAULT = ("ekf", "graph", "window:100")
 @options.as_json
 @options.seed
 @options.scenario
-@options.scale
+@options.recording
 @results.report_option
 def command(
     source: str,
@@ -31,7 +32,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
-    scale: str | None,
+    recording: Recording,
     report: str | None,
 ) -> int:
     """Compare several estimators on SOURCE.
@@ -51,7 +52,7 @@ def command(
     estimators = options.parsed(names, DEFAULT)
     from piazzi.cli.sources import run_comparison
 
-    source_name, comparison, warning = run_comparison(source, estimators, seed, scenario, scale, bar=report is not None)
+    source_name, comparison, warning = run_comparison(source, estimators, seed, scenario, recording, bar=report is not None)
 
     def tab() -> Tab:
         from piazzi.present.report import comparison_tab

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from piazzi.estimate.estimator import Estimate
     from piazzi.estimate.forecast import Forecast
     from piazzi.evaluate import Comparison
+    from piazzi.scenarios import Recording
 
 SCHEMA = "piazzi.estimate/1"
 DEFAULT = "ekf"
@@ -27,7 +28,7 @@ ENDINGS = (".json", ".csv", ".npz", ".nc")
 @options.as_json
 @options.seed
 @options.scenario
-@options.scale
+@options.recording
 @click.option(
     "--predict",
     "ahead",
@@ -43,7 +44,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
-    scale: str | None,
+    recording: Recording,
     ahead: str | None,
     follow: str | None,
     checkpoint: str | None,
@@ -63,7 +64,10 @@ def command(
     if ahead is not None and follow is not None:
         raise click.UsageError("--predict and --follow do not go together", click.get_current_context())
     if follow is not None:
-        return _follow(source, options.parsed(names, (DEFAULT,)), output_file, as_json, follow, checkpoint, scale)
+        if recording.columns:
+            raise click.UsageError("--columns and --follow do not go together", click.get_current_context())
+        estimator = options.parsed(names, (DEFAULT,))
+        return _follow(source, estimator, output_file, as_json, follow, checkpoint, recording.scale)
     if checkpoint is not None:
         raise click.UsageError("--checkpoint goes with --follow", click.get_current_context())
     output.check_output(output_file, ENDINGS)
@@ -76,7 +80,7 @@ def command(
         times_ahead(ahead, 0.0)  # what cannot be read is told before anything is computed
     from piazzi.cli.sources import run_comparison
 
-    source_name, comparison, _ = run_comparison(source, estimators, seed, scenario, scale, thorough=False)
+    source_name, comparison, _ = run_comparison(source, estimators, seed, scenario, recording, thorough=False)
     forecasts = {} if ahead is None else predicted(comparison, ahead)
     document = to_dict(comparison, forecasts)
     if output_file is not None:

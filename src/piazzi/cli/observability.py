@@ -11,6 +11,7 @@ from piazzi.cli import options, results
 if TYPE_CHECKING:
     from piazzi.evaluate.observable import Observability
     from piazzi.present.report import Tab
+    from piazzi.scenarios import Recording
 
 
 @click.command(cls=options.Command)
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 @options.as_json
 @options.seed
 @options.scenario
-@options.scale
+@options.recording
 @results.report_option
 def command(
     source: str,
@@ -31,7 +32,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
-    scale: str | None,
+    recording: Recording,
     report: str | None,
 ) -> int:
     """Analyse the observability of the first state in SOURCE.
@@ -54,7 +55,7 @@ def command(
     from piazzi.cli.sources import load_source
     from piazzi.evaluate.observing import observability
 
-    source_found = load_source(source, seed, scenario, scale)
+    source_found = load_source(source, seed, scenario, recording)
     problem, tracking = source_found.problem, source_found.tracking
     add = additions(problem, added)
     found = observability(problem, tracking, add=add, twins=not no_twins, source=source_found.name)

@@ -8,8 +8,9 @@ import re
 import stat
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from contextlib import suppress
+from functools import wraps
 from itertools import combinations
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import click
 
@@ -18,13 +19,24 @@ source = click.argument("source", metavar="SOURCE")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, and nothing else there.")
 scenario = click.option("--scenario", metavar="NAME", help="Scenario that defines the problem for CSV input.")
 SCALES = ("UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1")
-scale = click.option(
-    "--scale",
-    metavar="SCALE",
-    type=click.Choice(SCALES, case_sensitive=False),
-    help=f"Time scale of dates in CSV input that name none: {', '.join(SCALES)}.",
-)
 STREAM = "-"
+
+
+def recording(function: F) -> F:
+    """Options --scale and --columns, of CSV input, as one argument `recording`."""
+
+    @wraps(function)
+    def command(*args: Any, scale: str | None, columns: str | None, **rest: Any) -> Any:
+        from piazzi.io.naming import parse_columns
+        from piazzi.scenarios import Recording
+
+        return function(*args, recording=Recording(parse_columns(columns or ""), scale), **rest)
+
+    scales = click.Choice(SCALES, case_sensitive=False)
+    said = f"Time scale of dates in CSV input that name none: {', '.join(SCALES)}."
+    text = "Names of the columns of CSV input by ours, such as 'range=RNG[km] week=gps_week sow=gps_tow'."
+    command = click.option("--scale", metavar="SCALE", type=scales, help=said)(command)
+    return cast(F, click.option("--columns", metavar="NAMES", help=text)(command))
 
 
 class WholeNumber(click.IntRange):

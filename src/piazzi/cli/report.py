@@ -13,6 +13,7 @@ from piazzi.cli.windows import whole_numbers
 if TYPE_CHECKING:
     from piazzi.evaluate import Comparison
     from piazzi.present.report import Section
+    from piazzi.scenarios import Recording
 
 DEFAULT = ("ekf", "graph", "window:100")
 
@@ -37,7 +38,7 @@ def _lags(context: click.Context, parameter: click.Parameter, text: str | None) 
 @click.option("--observability", "seen", is_flag=True, help="Also analyse the observability of the first state.")
 @options.seed
 @options.scenario
-@options.scale
+@options.recording
 def command(
     sources: tuple[str, ...],
     names: tuple[str, ...],
@@ -46,7 +47,7 @@ def command(
     seen: bool,
     seed: int,
     scenario: str | None,
-    scale: str | None,
+    recording: Recording,
 ) -> int:
     """Compare estimators on each SOURCE and write one page.
 
@@ -67,7 +68,7 @@ def command(
 
     tabs, success = [], True
     for source in sources:
-        of_rows = (scenario, scale) if source.lower().endswith(".csv") else (None, None)
+        of_rows = (scenario, recording) if source.lower().endswith(".csv") else (None, None)
         name, comparison, warning = run_comparison(source, estimators, seed, *of_rows, bar=True)
         title, radius = results.title_and_planet(source, name, scenario)
         more, well = _more(comparison, lags, seen)

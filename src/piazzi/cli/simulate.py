@@ -12,6 +12,7 @@ from piazzi.cli.running import DONE
 
 if TYPE_CHECKING:
     from piazzi.problem import Problem, Tracking
+    from piazzi.scenarios import Recording
 
 SCHEMA = "piazzi.simulate/1"
 ENDINGS = (".nc", ".csv", ".npz")
@@ -23,7 +24,7 @@ ENDINGS = (".nc", ".csv", ".npz")
 @options.as_json
 @options.seed
 @options.scenario
-@options.scale
+@options.recording
 @click.option(
     "--tolerance",
     type=options.number,
@@ -41,7 +42,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
-    scale: str | None,
+    recording: Recording,
     tolerance: float | None,
     truth: Literal["fixed", "drawn"] | None,
     perfect_guess: bool,
@@ -63,7 +64,7 @@ def command(
         raise click.UsageError("--json and -o - both want stdout", click.get_current_context())
     from piazzi.cli.sources import load_source
 
-    found = load_source(source, seed, scenario, scale)
+    found = load_source(source, seed, scenario, recording)
     problem, tracking = found.problem, found.tracking
     if truth or perfect_guess or noiseless:
         from piazzi.scenarios import vary

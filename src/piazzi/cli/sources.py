@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,6 +20,7 @@ from piazzi.problem import Problem, Tracking
 if TYPE_CHECKING:
     from piazzi.estimate.estimator import Estimator
     from piazzi.evaluate import Comparison
+    from piazzi.scenarios import Recording
 
 
 STDIN = "-"
@@ -37,23 +38,24 @@ class Source:
     recorded: bool
 
 
-def load_source(source: str, seed: int, scenario: str | None = None, scale: str | None = None) -> Source:
+def load_source(source: str, seed: int, scenario: str | None = None, recording: Recording | None = None) -> Source:
     """What `piazzi.loading` makes of a source, or of standard input for "-"; raises as that does."""
     from piazzi import load
     from piazzi.io.files import RECORDINGS
 
+    told: dict[str, Any] = {} if recording is None else {"scale": recording.scale, "columns": recording.columns}
     if not source:
         raise click.UsageError("SOURCE is empty", click.get_current_context(silent=True))
     if source.lower().endswith(".csv") and not scenario:
         raise click.UsageError(f"{source}: --scenario NAME says what it measures", click.get_current_context(silent=True))
     if source != STDIN:
-        problem, tracking = load(source, seed=seed, scenario=scenario, scale=scale)
+        problem, tracking = load(source, seed=seed, scenario=scenario, **told)
         found = Source(problem, tracking, os.path.basename(source) or source, source.lower().endswith(RECORDINGS))
         _say_moved_prior(found, scenario)
         return found
     path = _spooled(scenario)
     try:
-        problem, tracking = load(path, seed=seed, scenario=scenario, scale=scale)
+        problem, tracking = load(path, seed=seed, scenario=scenario, **told)
     except (ValueError, OSError) as error:
         text = str(error) if isinstance(error, ValueError) else error.strerror or str(error)
         raise ValueError(text.replace(str(path), "standard input")) from None
@@ -112,7 +114,7 @@ def run_comparison(
     estimators: Mapping[str, Estimator],
     seed: int,
     scenario: str | None,
-    scale: str | None = None,
+    recording: Recording | None = None,
     *,
     bar: bool = False,
     thorough: bool = True,
@@ -124,7 +126,7 @@ def run_comparison(
     """
     from piazzi.evaluate import compare
 
-    found = load_source(source, seed, scenario, scale)
+    found = load_source(source, seed, scenario, recording)
     with output.progress(len(estimators), long=bar or len(found.tracking.times) * len(estimators) > _LONG) as step:
         comparison = compare(found.problem, found.tracking, estimators, source=found.name, announce=step, thorough=thorough)
     warning = _warning_of_steps(found, comparison, estimators)

@@ -10,6 +10,7 @@ from piazzi.cli import options, output, results
 
 if TYPE_CHECKING:
     from piazzi.present.report import Tab
+    from piazzi.scenarios import Recording
 
 DEFAULT = "1,2,5,10,20,50,100,200"
 _LARGEST = 1_000_000
@@ -46,7 +47,7 @@ def whole_numbers(context: click.Context, parameter: click.Parameter, text: str)
 @options.as_json
 @options.seed
 @options.scenario
-@options.scale
+@options.recording
 @results.report_option
 def command(
     source: str,
@@ -57,7 +58,7 @@ def command(
     as_json: bool,
     seed: int,
     scenario: str | None,
-    scale: str | None,
+    recording: Recording,
     report: str | None,
 ) -> int:
     """Try sliding windows of several lengths on SOURCE.
@@ -75,7 +76,7 @@ def command(
     from piazzi.cli.sources import load_source
     from piazzi.evaluate.window_lengths import steps_of, windows
 
-    found = load_source(source, seed, scenario, scale)
+    found = load_source(source, seed, scenario, recording)
     problem, tracking = found.problem, found.tracking
     steps = steps_of(lags, tracking, graph=not no_graph)
     with output.progress(steps, long=len(tracking.times) * sum(lags) > _LONG) as step:

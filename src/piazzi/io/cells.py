@@ -6,8 +6,8 @@ import csv
 import io
 import os
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from math import nan
 from typing import NamedTuple
 
@@ -41,6 +41,7 @@ class Cells:
     lines : line of the file that each row is in
     dates : (J,) texts of the column of time, as bytes, where it has dates; it is not among the numbers then
     scale : what the name of that column says of the time scale, None where it says nothing
+    notes : what should be said of the table
     """
 
     comments: tuple[str, ...]
@@ -50,10 +51,22 @@ class Cells:
     lines: Sequence[int]
     dates: Array | None = None
     scale: str | None = None
+    notes: tuple[str, ...] = ()
+
+    def in_order(self, order: Array) -> Cells:
+        """The same table with its rows in another order."""
+        numbers = {name: column[order] for name, column in self.numbers.items()}
+        station = None if self.station is None else self.station[order]
+        dates = None if self.dates is None else self.dates[order]
+        lines = np.asarray(self.lines)[order].tolist()
+        return replace(self, numbers=numbers, station=station, dates=dates, lines=lines)
 
 
-def read_cells(path: str | os.PathLike[str]) -> Cells:
+def read_cells(path: str | os.PathLike[str], named: Callable[[list[str]], list[str]] | None = None) -> Cells:
     """All columns of a file whose first line, after comments, names them.
+
+    Cells are separated by commas, or by what the first line has instead: semicolons, tabs or blanks.  `named` makes other
+    names of the columns, "" of one that is left out.
 
     Raises
     ------
@@ -82,10 +95,38 @@ def read_cells(path: str | os.PathLike[str]) -> Cells:
         if first.startswith(b"#"):
             comments.append(_decoded(first[1:], line).strip())
         elif first.strip():
-            header, body = parse_header(first, line), rest[start:].rstrip(b"\n")
-            table = (body, line + 1, header, tuple(comments))
-            return (fast(*table) if len(body) >= SMALL else None) or parse_rows(*table)
+            first, body, note = with_commas(first, rest[start:].rstrip(b"\n"), line)
+            header = parse_header(first, line)
+            table = (body, line + 1, header if named is None else named(header), tuple(comments))
+            cells = (fast(*table) if len(body) >= SMALL else None) or parse_rows(*table)
+            return replace(cells, notes=(note,)) if note else cells
     raise ValueError("the file is empty: no line names its columns")
+
+
+def with_commas(first: bytes, body: bytes, line: int) -> tuple[bytes, bytes, str]:
+    """Header and rows with commas between cells, and what to say where others stood there.
+
+    Raises
+    ------
+    ValueError
+        For a comma or a quote among cells that others separate, with its line.
+    """
+    if b"," in first or b'"' in first:
+        return first, body, ""
+    mark = b";" if b";" in first else b"\t" if b"\t" in first else None
+    if mark is None and len(first.split()) < 2:
+        return first, body, ""
+    what = {b";": "semicolons", b"\t": "tabs", None: "blanks"}[mark]
+    for odd, name in ((b",", "a comma"), (b'"', "a quote")):
+        if odd in body:
+            at = line + 1 + body.count(b"\n", 0, body.index(odd))
+            hint = "; decimals have a point" if odd == b"," else ""
+            raise ValueError(f"line {at}: there is {name} among cells that {what} separate{hint}")
+    note = f"{what} separate its cells"
+    if mark is not None:
+        return first.replace(mark, b","), body.replace(mark, b","), note
+    rows = (b",".join(row.split()) for row in body.split(b"\n"))
+    return b",".join(first.split()), b"\n".join(rows), note
 
 
 def _decoded(content: bytes, line: int) -> str:
@@ -122,15 +163,15 @@ def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -
     import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 
     texts = dated(header, body[: body.find(b"\n")].split(b","))
-    kinds = {i: str if name == STATION or i == texts.column else float for i, name in enumerate(header)}
+    kinds = {i: str if name == STATION or i == texts.column else float for i, name in enumerate(header) if name}
     try:
         table = pd.read_csv(
-            io.BytesIO(body), header=None, index_col=False, dtype=kinds, na_values=[""], keep_default_na=False,
-            skip_blank_lines=False, engine="c", low_memory=False, **_exact(pd.__version__),
+            io.BytesIO(body), header=None, index_col=False, usecols=list(kinds), dtype=kinds, na_values=[""],
+            keep_default_na=False, skip_blank_lines=False, engine="c", low_memory=False, **_exact(pd.__version__),
         )  # fmt: skip
     except (ValueError, OverflowError):  # among them all of pandas' own errors of parsing
         return None
-    numbers = {name: np.ascontiguousarray(table[i], dtype=float) for i, name in enumerate(header) if kinds[i] is float}
+    numbers = {name: np.ascontiguousarray(table[i], dtype=float) for i, name in enumerate(header) if kinds.get(i) is float}
     if any(_is_binary(column) for column in numbers.values()) and any(word in body for word in _WORDS):
         return None
     station: Array | None = None
@@ -196,7 +237,7 @@ def parse_rows(body: bytes, line: int, header: list[str], comments: tuple[str, .
     text = _decoded(body, line)
     texts: Dated | None = None
     dates: list[str] = []
-    columns: dict[str, list[float]] = {name: [] for name in header if name != STATION}
+    columns: dict[str, list[float]] = {name: [] for name in header if name not in ("", STATION)}
     stations: dict[str, int] = {}
     station: list[int] = []
     lines: list[int] = []
@@ -211,6 +252,8 @@ def parse_rows(body: bytes, line: int, header: list[str], comments: tuple[str, .
                 raise ValueError(f"line {at} has {cells}; the header names {len(header)} ({', '.join(header)[:200]})")
             texts = texts or dated(header, row)
             for i, (name, cell) in enumerate(zip(header, row, strict=True)):
+                if not name:
+                    continue
                 if i == texts.column:
                     dates.append(_date(cell, at))
                 elif name == STATION:

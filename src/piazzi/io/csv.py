@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Iterable, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
@@ -15,32 +16,44 @@ import numpy as np
 
 from piazzi.io.atomic import atomic_path
 from piazzi.io.cells import STATION, TIME, Cells, read_cells
-from piazzi.io.dates import EPOCH, times_of
+from piazzi.io.dates import EPOCH, has_weeks, times_of
+from piazzi.io.naming import SECONDS, TRUTH, WEEK, RecordingWarning, fitting, named, own_names
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.epochs import epoch_of
+from piazzi.scenarios import Recording
 from piazzi.text import escape_formula, nearest, unescape_formula
 from piazzi.units import Unit, Units
 
 if TYPE_CHECKING:
     from piazzi.estimate.estimator import Estimate
 
-TRUTH = "truth:"
 _UNIT = re.compile(r"(.*?)\s*\[([^\[\]]*)\]")
 
 
-def read_csv(path: str | os.PathLike[str], problem: Problem, scale: str | None = None) -> Tracking:
+def read_csv(
+    path: str | os.PathLike[str],
+    problem: Problem,
+    scale: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    usual: Recording | None = None,
+) -> Tracking:
     """The measurements in a file, of a problem's stations.
 
-    The first line names the columns: ``time``, ``station`` (not needed where there is one), the components of the sensors,
-    and, where the truth is known, ``truth:`` and a state.  Empty cells are missing values; columns that a station in the file
-    needs may be empty, but not absent.  A name behind an apostrophe, as spreadsheets are kept from formulas, is that name.
+    The first line names the columns, in letters of any case: ``time``, ``station`` (not needed where there is one), the
+    components of the sensors, and, where the truth is known, ``truth:`` and a state.  Empty cells are missing values; columns
+    that a station in the file needs may be empty, but not absent.  A name behind an apostrophe, as spreadsheets are kept from
+    formulas, is that name.
     Numbers are in SI and radians (in the model's own units, where one made in Python names others), or in the unit that a
     column names, as in ``bearing [deg]``, which must be of the column's kind.
 
     Times are seconds, or dates with their scale: in each cell, as the unit of the column, ``time[UTC]``, or as `scale`.  See
     `times_of` for what they are counted from.  Where file and problem each have an epoch, times become those past the
-    problem's.
+    problem's.  Instead of a time a row may have ``week`` and ``sow``, weeks of GPS and seconds of them.
+
+    `columns` says what columns are called that have other names, ``{"range": "RNG [km]"}``; what it leaves out and is not
+    known here is left alone.  Rows that are out of order are sorted, and a warning says so; another one says which marks
+    separate cells where commas do not.  `usual` stands for what is not said, where it fits the file.
 
     Raises
     ------
@@ -50,9 +63,16 @@ def read_csv(path: str | os.PathLike[str], problem: Problem, scale: str | None =
         For columns, stations or cells that do not fit; the message names the file and the line.
     """
     try:
-        return cells_to_tracking(read_cells(path), problem, scale)
+        usual = usual or Recording()
+        cells = read_cells(path, lambda header: named(header, problem, columns or fitting(header, usual.columns)))
+        unsaid = cells.dates is not None and cells.scale is None
+        tracking, falls = _in_order(cells, problem, scale or (usual.scale if unsaid else None))
     except ValueError as error:
         raise ValueError(f"{os.fspath(path)}: {error}") from None
+    notes = (*cells.notes, *([f"{falls:,} of its rows were before the one above them: sorted"] if falls else []))
+    for note in notes:
+        warnings.warn(f"{os.fspath(path)}: {note}", RecordingWarning, stacklevel=3)
+    return tracking
 
 
 def write_csv(path: str | os.PathLike[str], problem: Problem, tracking: Tracking) -> None:
@@ -187,11 +207,20 @@ def _own_units(label: str, problem: Problem) -> dict[str, Unit | None]:
 
 def cells_to_tracking(cells: Cells, problem: Problem, scale: str | None = None) -> Tracking:
     """The measurements in a table; raises ValueError for columns, stations or cells that do not fit the problem."""
+    return _in_order(cells, problem, scale)[0]
+
+
+def _in_order(cells: Cells, problem: Problem, scale: str | None) -> tuple[Tracking, int]:
+    """The measurements in the order of their times, and how many rows were before the one above them."""
     cells = _in_own_units(cells, problem)
     if not problem.stations:
         raise ValueError("the problem has no stations, so nothing can be measured")
     _check_columns(cells, problem)
-    times, epoch, _ = times_of(cells, problem, scale)
+    times, epoch = times_of(cells, problem, scale)
+    falls = int((times[1:] < times[:-1]).sum())
+    if falls:
+        order = np.argsort(times, kind="stable")
+        cells, times = cells.in_order(order), times[order]
     station = _stations(cells, problem)
     values = _values(cells, problem, station)
     _check_components(cells, problem, station)
@@ -201,7 +230,7 @@ def cells_to_tracking(cells: Cells, problem: Problem, scale: str | None = None) 
     known = TRUTH + states[0] in cells.numbers
     truth = np.column_stack([_true(cells, s)[first] for s in states]) if known else None
     tracking = Tracking(times, values, names, truth, epoch)
-    return tracking if None in (epoch, problem.epoch) else tracking.with_epoch(problem.epoch)
+    return tracking if None in (epoch, problem.epoch) else tracking.with_epoch(problem.epoch), falls
 
 
 def _true(cells: Cells, state: str) -> Array:
@@ -218,11 +247,11 @@ def _check_columns(cells: Cells, problem: Problem) -> None:
     """Refuse columns that mean nothing here, and tables that lack one."""
     components = {c for s in problem.stations for c in problem.model.sensor(s.sensor).components}
     truths = [TRUTH + s for s in problem.model.names]
-    valid = [TIME, STATION, *sorted(components), *truths]
+    valid = [*own_names(problem), *((WEEK, SECONDS) if has_weeks(cells) else ())]
     for name in cells.numbers:
         if name not in valid:
             raise ValueError(f"unknown column {name[:60]!r}{nearest(name[:60], valid)}")
-    if TIME not in cells.numbers and cells.dates is None:
+    if TIME not in cells.numbers and cells.dates is None and not has_weeks(cells):
         raise ValueError(f"there is no column {TIME!r}")
     if not components & cells.numbers.keys():
         raise ValueError(f"there is no column of measurements ({', '.join(sorted(components))})")
@@ -258,7 +287,8 @@ def _stations(cells: Cells, problem: Problem) -> Array:
 def _values(cells: Cells, problem: Problem, station: Array) -> Array:
     """Measurements (J, m) in the order of each sensor's components."""
     out = np.full((len(station), problem.model.width), np.nan)
-    columns = {name: column for name, column in cells.numbers.items() if name != TIME and not name.startswith(TRUTH)}
+    others = (TIME, WEEK, SECONDS) if has_weeks(cells) else (TIME,)
+    columns = {name: column for name, column in cells.numbers.items() if name not in others and not name.startswith(TRUTH)}
     for s, place in enumerate(problem.stations):
         rows = slice(None) if len(problem.stations) == 1 else np.flatnonzero(station == s)
         components = problem.model.sensor(place.sensor).components

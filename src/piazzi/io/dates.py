@@ -1,79 +1,72 @@
-"""Times of a table: seconds as they are, or dates as seconds past an epoch."""
+"""Times of a table: seconds as they are; dates, or weeks and seconds of them, as seconds past an epoch."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from piazzi.io.cells import TIME, Cells
+from piazzi.io.naming import SECONDS, WEEK
 from piazzi.problem import Problem
-from piazzi.problem.checks import Array, backwards, check_span
-from piazzi.problem.epochs import check_near, epoch_given
+from piazzi.problem.checks import Array, check_span
+from piazzi.problem.epochs import FARTHEST, check_near, epoch_given
 
 if TYPE_CHECKING:
     from piazzi.earth import Epoch
 
 EPOCH = "epoch = "
+MOST_WEEKS = 10_000
+SECONDS_OF_WEEK = 604800.0
 
 
 class Times(NamedTuple):
-    """Seconds (J,), the instant that they are past, where it is known, and the scale of the dates, "" for none."""
+    """Seconds (J,), and the instant that they are past, where it is known."""
 
     seconds: Array
     epoch: Epoch | None
-    scale: str = ""
 
 
 def times_of(cells: Cells, problem: Problem, scale: str | None = None) -> Times:
-    """The times of a table, which do not fall.
+    """The times of a table, in the order of its rows.
 
     Dates become seconds of TT past the problem's epoch, or else the one in a comment of the file; a problem whose prior is at
-    the first measurement needs neither, and begins at the first date.  `scale` is that of dates that name none.
+    the first measurement needs neither, and begins at the first date.  `scale` is that of dates that name none.  Columns
+    ``week`` and ``sow`` are weeks of GPS since 1980 and seconds of the week.
 
     Raises
     ------
     ValueError
-        With the line, for what is no date or no number, is in another scale than what is above, falls, or is far from the
-        epoch; for dates without any epoch; for a scale where there are no dates.
+        With the line, for what is no date or no number, is in another scale than what is above, or is far from the epoch; for
+        dates without any epoch; for a scale where there are no dates.
     """
-    epoch = epoch_in(cells.comments)
-    if cells.dates is None:
-        if scale is not None:
-            raise ValueError(f"--scale {scale} is for dates; the times of this file are seconds")
-        found = Times(cells.numbers[TIME], epoch)
-        _check(cells, found.seconds, [])
-        return found
-    if not cells.dates.size:
+    rows = len(cells.lines)
+    if not rows:
         raise ValueError("there are no measurements: only a header")
-    found = _dated(cells, cells.dates, problem.epoch or epoch, _scale(cells, scale), problem)
-    _check(cells, found.seconds, cells.dates)
-    return found
+    epoch = epoch_in(cells.comments)
+    if has_weeks(cells):
+        week = cells.numbers[WEEK]
+        return _past(cells, *_weeks(cells, scale), problem.epoch or epoch, problem, lambda i: f"week {week[i]:g}")
+    if cells.dates is not None:
+        dates = cells.dates
+        instants = _instants(cells, dates, _scale(cells, scale))
+        return _past(cells, *instants, problem.epoch or epoch, problem, lambda i: str(dates[i].decode()))
+    if scale is not None:
+        raise ValueError(f"--scale {scale} is for dates; the times of this file are seconds")
+    times = cells.numbers[TIME]
+    bad = np.flatnonzero(~np.isfinite(times))
+    if bad.size:
+        what = "is missing" if np.isnan(times[bad[0]]) else f"is {times[bad[0]]}"
+        raise ValueError(f"line {cells.lines[bad[0]]}: the time {what}; it must be finite")
+    last = int(np.argmax(times))
+    check_span(times.min(), times[last], f"line {cells.lines[last]}")
+    return Times(times, epoch)
 
 
-def _dated(cells: Cells, dates: Array, epoch: Epoch | None, scale: str | None, problem: Problem) -> Times:
-    from piazzi.earth import Epoch
-    from piazzi.earth.columns import read_dates
-
-    try:
-        kind, whole, fraction = read_dates(dates, scale, lambda i: f"line {cells.lines[i]}: ")
-    except ValueError as error:
-        hint = "; or say it once: --scale UTC, or time[UTC] as the name of the column" if "no time scale" in str(error) else ""
-        raise ValueError(f"{error}{hint}") from None
-    if epoch is None:
-        first = Epoch.at(float(whole[0]), float(fraction[0]))
-        if problem.prior_time is not None:
-            raise ValueError(
-                f"line {cells.lines[0]}: there are dates, but the problem has no epoch, so nothing says where they are beside "
-                f'its prior at {problem.prior_time:g} s: give it one, such as epoch = "{first.exact()}"'
-            )
-        epoch = first
-    seconds = (whole - epoch.whole) + (fraction - epoch.fraction)
-    far = np.flatnonzero(np.abs(seconds) >= 1e8)
-    if far.size:
-        check_near(seconds[far[0]], epoch, f"line {cells.lines[far[0]]}: {dates[far[0]].decode()}, at")
-    return Times(seconds, epoch, kind)
+def has_weeks(cells: Cells) -> bool:
+    """Whether weeks and their seconds say the time."""
+    return {WEEK, SECONDS} <= cells.numbers.keys() and TIME not in cells.numbers and cells.dates is None
 
 
 def epoch_in(comments: Sequence[str]) -> Epoch | None:
@@ -81,23 +74,59 @@ def epoch_in(comments: Sequence[str]) -> Epoch | None:
     return epoch_given(next((c.removeprefix(EPOCH) for c in comments if c.startswith(EPOCH)), ""))
 
 
+def _instants(cells: Cells, dates: Array, scale: str | None) -> tuple[Array, Array]:
+    """Instants of dates, as whole seconds of TT past J2000.0 and a fraction."""
+    from piazzi.earth.columns import read_dates
+
+    try:
+        return read_dates(dates, scale, lambda i: f"line {cells.lines[i]}: ")[1:]
+    except ValueError as error:
+        hint = "; or say it once: --scale UTC, or time[UTC] as the name of the column" if "no time scale" in str(error) else ""
+        raise ValueError(f"{error}{hint}") from None
+
+
+def _weeks(cells: Cells, scale: str | None) -> tuple[Array, Array]:
+    """Instants of weeks of GPS and seconds of them."""
+    from piazzi.earth import Epoch
+
+    if scale not in (None, "GPS"):
+        raise ValueError(f"--scale {scale} was said, but weeks and seconds of them are in GPS")
+    week, second = cells.numbers[WEEK], cells.numbers[SECONDS]
+    bad = ~((week >= 0) & (week < MOST_WEEKS) & (week == np.floor(week)))
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise ValueError(f"line {cells.lines[i]}: the week is {week[i]:g}; it must be a whole number below {MOST_WEEKS:,}")
+    bad = ~((second >= 0) & (second < SECONDS_OF_WEEK))
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise ValueError(f"line {cells.lines[i]}: the second of the week is {second[i]:g}; it must be from 0 to 604800")
+    first, whole = Epoch("1980-01-06T00:00:00 GPS"), np.floor(second)
+    return first.whole + week * SECONDS_OF_WEEK + whole, first.fraction + (second - whole)
+
+
+def _past(
+    cells: Cells, whole: Array, fraction: Array, epoch: Epoch | None, problem: Problem, said: Callable[[int], str]
+) -> Times:
+    """Instants as seconds past an epoch, or else past the first of them; `said` is how a row says it."""
+    if epoch is None:
+        from piazzi.earth import Epoch
+
+        i = int(np.lexsort((fraction, whole))[0])
+        epoch = Epoch.at(float(whole[i]), float(fraction[i]))
+        if problem.prior_time is not None:
+            raise ValueError(
+                f"line {cells.lines[i]}: there are dates, but the problem has no epoch, so nothing says where they are beside "
+                f'its prior at {problem.prior_time:g} s: give it one, such as epoch = "{epoch.exact()}"'
+            )
+    seconds = (whole - epoch.whole) + (fraction - epoch.fraction)
+    far = np.flatnonzero(np.abs(seconds) >= FARTHEST)
+    if far.size:
+        check_near(seconds[far[0]], epoch, f"line {cells.lines[far[0]]}: {said(int(far[0]))}, at")
+    return Times(seconds, epoch)
+
+
 def _scale(cells: Cells, said: str | None) -> str | None:
     """The scale of dates that name none."""
     if said is not None and cells.scale is not None and said.upper() != cells.scale:
         raise ValueError(f"--scale {said} was said, but column {TIME!r} is in {cells.scale}")
     return cells.scale or said
-
-
-def _check(cells: Cells, times: Array, dates: Array | list[bytes]) -> None:
-    """Refuse times that are not finite or fall; `dates` are what they were read from, if they were dates."""
-    if not times.size:
-        raise ValueError("there are no measurements: only a header")
-    bad = np.flatnonzero(~np.isfinite(times))
-    if bad.size:
-        what = "is missing" if np.isnan(times[bad[0]]) else f"is {times[bad[0]]}"
-        raise ValueError(f"line {cells.lines[bad[0]]}: the time {what}; it must be finite")
-    i = backwards(times)
-    if i is not None:
-        later, earlier = (dates[k].decode() if len(dates) else f"{times[k]:g} s" for k in (i, i - 1))
-        raise ValueError(f"line {cells.lines[i]}: times must increase, but {later} comes after {earlier}")
-    check_span(times[0], times[-1], f"line {cells.lines[-1]}")

@@ -19,7 +19,7 @@ from piazzi.problem.checks import Array
 from piazzi.problem.epochs import epoch_given
 from piazzi.scenarios.equations import read_physics
 from piazzi.scenarios.motion import read_gauss_markov, read_integrator, read_manoeuvres
-from piazzi.scenarios.scenario import Picture, Scenario, read_plan, read_times
+from piazzi.scenarios.scenario import Picture, Scenario, read_plan, read_recording, read_times
 from piazzi.scenarios.table import Fault, Faults, ScenarioError, Table, shown
 from piazzi.scenarios.truth import read_truth
 from piazzi.scenarios.values import read_noise, read_parameters, read_prior, read_stations
@@ -38,6 +38,7 @@ _PLACE = re.compile(r" \(at (line \d+, column \d+|end of document)\)$")
 SECTIONS = (
     "title", "epoch", "units", "states", "memory", "groups", "definitions", "dynamics", "step", "parameters", "sensors",
     "stations", "prior", "process_noise", "gauss_markov", "integrator", "manoeuvres", "times", "truth", "picture", "study",
+    "recording",
 )  # fmt: skip
 MAX_STEPS = 10**10
 MAX_ROWS = 2 * 10**7
@@ -158,14 +159,14 @@ def read_scenario(data: Mapping[str, Any], name: str, faults: Faults) -> Scenari
         faults[:] = [*faults[len(of_times) :], *of_times]  # those of the equations and numbers first
         picture = Picture(file.table("picture").number("planet_radius", units.length(), positive=True))
         file.table("picture").finish(("planet_radius",))
-        plan = read_plan(file.table("study"))
+        plan, recording = read_plan(file.table("study")), read_recording(file.table("recording"))
         file.finish(SECTIONS)
         if problem is not None and times is not None:
             _check_size(problem, times, faults)
             _check_schedules(problem, times, faults)
     if faults or problem is None or times is None:
         return None
-    return Scenario(name, title or name, problem, times, picture, plan)
+    return Scenario(name, title or name, problem, times, picture, plan, recording)
 
 
 def read_problem(file: Table, name: str, units: Units, start: float | None = None) -> Problem | None:

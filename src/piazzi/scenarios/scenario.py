@@ -39,6 +39,14 @@ class Plan:
     vary: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Recording:
+    """How recordings in CSV are to be read: names of their columns by ours, and the time scale of dates that name none."""
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    scale: str | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Scenario:
     """A problem with the times at which it is measured.
@@ -50,6 +58,7 @@ class Scenario:
     times : (K,) seconds, increasing
     picture : Picture
     study : Plan
+    recording : Recording
     """
 
     name: str
@@ -58,6 +67,16 @@ class Scenario:
     times: Array
     picture: Picture = field(default_factory=Picture)
     study: Plan = field(default_factory=Plan)
+    recording: Recording = field(default_factory=Recording)
+
+
+def read_recording(table: Table) -> Recording:
+    """The section [recording]: names of columns, and the scale of dates."""
+    inner = table.table("columns")
+    columns = {ours: theirs for ours in inner.data if (theirs := inner.text(ours))}
+    scale = table.text("scale")
+    table.finish()
+    return Recording(columns, scale)
 
 
 def read_plan(table: Table) -> Plan:
