@@ -8,6 +8,10 @@ import stat
 from typing import BinaryIO
 
 
+class RecordingWarning(UserWarning):
+    """What was put right in a recording, or taken to mean something."""
+
+
 def opened(path: str | os.PathLike[str]) -> BinaryIO:
     """A file, open for reading; raises OSError where it cannot be, or is a pipe or a device, behind links or not."""
     # a pipe that nobody writes to would make the call itself wait

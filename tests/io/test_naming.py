@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 import piazzi as pz
 from piazzi.io import cells
 from piazzi.io.csv import read_csv
-from piazzi.io.naming import RecordingWarning, named, parse_columns
+from piazzi.io.naming import named, parse_columns
+from piazzi.opening import RecordingWarning
 from tests.io.test_csv import ALONE, GOOD, PROBLEM
 from tests.references.drawn import same_tracking
 
@@ -174,6 +175,22 @@ def test_a_scenario_says_how_its_recordings_are_to_be_read(tmp_path):
     assert same_tracking(pz.load(rows, scenario=path)[1], simulated)
     with pytest.raises(ValueError, match=r"--columns is for a \.csv file"):
         pz.load(path, columns="rng=X")
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_refusal_is_one_line_whatever_was_put_right_before(tmp_path, capsys):
+    from piazzi.cli.main import main
+
+    path, rows = tmp_path / "a.toml", tmp_path / "rows.csv"
+    path.write_text(SCENARIO)
+    rows.write_text("time;rng\n0;1\n1;2\n")
+    assert main(["simulate", str(rows), "--scenario", str(path)]) == 0
+    assert capsys.readouterr().err.count("rows.csv: semicolons separate its cells") == 1
+    path.write_text(SCENARIO.replace('epoch = "2016-02-13T16:00:00 UTC"', ""))
+    rows.write_text("time;rng\n0;1\n-1e308;2\n")
+    assert main(["simulate", str(rows), "--scenario", str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "cannot be propagated back" in line
 
 
 def test_the_command_line_names_columns(tmp_path):

@@ -9,10 +9,12 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import click
 
+from piazzi.opening import RecordingWarning
 from piazzi.text import printable
 
 DONE, INTERNAL, BAD_INPUT, NOT_ESTIMATED = 0, 1, 2, 3
@@ -29,8 +31,12 @@ def run(command: click.Command, arguments: Sequence[str] | None) -> int:
     logger.setLevel(logging.INFO)
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = _show_warning
-            return _guarded(command, arguments)
+            held: list[str] = []
+            warnings.showwarning = partial(_show_warning, held)
+            status = _guarded(command, arguments)
+            for line in held if status != BAD_INPUT else ():  # a refusal stands alone
+                say(line)
+            return status
     finally:
         logger.removeHandler(handler)
 
@@ -115,8 +121,13 @@ def _abandon_stdout() -> None:
         os.close(nowhere)
 
 
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    say(f"warning: {message}")
+def _show_warning(held: list[str], message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    """Say a warning; what was put right in a recording is held until it is known that it was of use."""
+    line = f"warning: {message}"
+    if issubclass(category, RecordingWarning):
+        held.append(line)
+    else:
+        say(line)
 
 
 class _Lines(logging.Handler):

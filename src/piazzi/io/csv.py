@@ -17,7 +17,8 @@ import numpy as np
 from piazzi.io.atomic import atomic_path
 from piazzi.io.cells import STATION, TIME, Cells, read_cells
 from piazzi.io.dates import EPOCH, has_weeks, times_of
-from piazzi.io.naming import SECONDS, TRUTH, WEEK, RecordingWarning, fitting, named, own_names
+from piazzi.io.naming import SECONDS, TRUTH, WEEK, fitting, named, own_names
+from piazzi.opening import RecordingWarning
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.epochs import epoch_of

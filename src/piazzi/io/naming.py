@@ -16,10 +16,6 @@ _LABEL = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?")
 _PAIR = re.compile(r"\s*([^\s=,]+)\s*=\s*((?:[^\s,\[\]]|\[[^\[\]]*\])+)\s*(?:,|(?=\s)|$)")
 
 
-class RecordingWarning(UserWarning):
-    """What was put right in a recording, or taken to mean something."""
-
-
 def parse_columns(text: str) -> dict[str, str]:
     """Pairs of a name here and a column of a file, such as ``week=gps_week x=X[km]``; raises ValueError for other text."""
     out: dict[str, str] = {}
