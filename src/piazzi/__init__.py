@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         DormandPrince,
         DormandPrince5,
         Euler,
+        GaussJackson,
         Heun,
         Integrator,
         Kepler,
@@ -73,8 +74,8 @@ _WHERE = {
     name: module
     for module, names in {
         "piazzi.model": "Model Parameter Sensor",
-        "piazzi.kernels": "ConstantAcceleration Discrete DormandPrince DormandPrince5 Euler Heun Integrator Kepler Midpoint "
-        "Ralston RungeKutta RungeKutta4 RungeKutta8 Taylor",
+        "piazzi.kernels": "ConstantAcceleration Discrete DormandPrince DormandPrince5 Euler GaussJackson Heun Integrator "
+        "Kepler Midpoint Ralston RungeKutta RungeKutta4 RungeKutta8 Taylor",
         "piazzi.earth": "Epoch",
         "piazzi.formats": "Ephemeris Observations read_ephemeris read_tracking",
         "piazzi.problem": "Gaussian Manoeuvre Pass Problem ProcessNoise Schedule Station Tracking Truth passes "
@@ -115,9 +116,9 @@ __version__ = "0.1.0"
 __all__ = [
     "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Discrete", "DormandPrince",
     "DormandPrince5", "Ephemeris", "Epoch", "Estimate", "Euler", "ExtendedKalmanFilter", "FactorGraph", "Forecast",
-    "Gaussian", "Heun", "Huber", "Integrator", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre",
-    "Midpoint", "Model", "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise",
-    "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother",
+    "GaussJackson", "Gaussian", "Heun", "Huber", "Integrator", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow",
+    "Manoeuvre", "Midpoint", "Model", "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem",
+    "ProcessNoise", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother",
     "SquareRootKalmanFilter", "Station", "Study", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated",
     "WindowTrade", "choose_substeps", "compare", "difference", "earth", "formats", "kepler_transition", "load",
     "observability", "orbit", "passes", "predict", "propagate_kepler", "read_ephemeris", "read_store", "read_tracking",

@@ -75,13 +75,15 @@ def scaling_of(problem: Problem) -> Array:
 class Chain:
     """States `x` (K, n) of one problem and everything that is linearised about them."""
 
+    dynamics: ClassVar[str] = ""  # the fragment that linearises them, where that is not the problem's usual one
     reweighted: ClassVar[bool] = False  # whether rows are weighed anew at every step, which converges linearly
 
     def __init__(self, problem: Problem, inputs: Inputs) -> None:
         self.problem, self.inputs = problem, inputs
-        self.library = kernels.load(
-            problem.spec(*chain_fragments(problem, *graph_fragments(problem)), lanes=lanes_for(problem.model.n))
-        )
+        fragments = chain_fragments(problem, *graph_fragments(problem))
+        if self.dynamics:
+            fragments = tuple(self.dynamics if name.startswith("linearize_") else name for name in fragments)
+        self.library = kernels.load(problem.spec(*fragments, lanes=lanes_for(problem.model.n)))
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
         J, A, varies = len(inputs.z), inputs.most_rows * M + N, problem.noise_varies
         self.linear = bundle.Chain.empty(X=K, C=K, N=N, L=K if varies else 1, B=J, M=M, A=A)

@@ -134,6 +134,11 @@ class Estimate(Locked):
         return self.problem.model.names
 
     @property
+    def max_step(self) -> float | None:
+        """Longest step of the integrator in seconds, as given or as chosen by its tolerance; None where it says otherwise."""
+        return self.problem.max_step(self.times)
+
+    @property
     def success(self) -> bool:
         return not self._why_not
 

@@ -136,7 +136,6 @@ def _parts(estimate: Estimate, at: Array) -> tuple[Array, Array, Array]:
     noise per step all mean one such interval.
     """
     problem = estimate.problem
-    assert problem.integrator is not None
     known = estimate.times if problem.prior_time is None else np.append(problem.prior_time, estimate.times)
     usual = [gap for gap in np.diff(known).tolist() if gap > 0]
     dt = np.diff(at, prepend=estimate.times[-1])
@@ -146,4 +145,8 @@ def _parts(estimate: Estimate, at: Array) -> tuple[Array, Array, Array]:
             f"the last time is {wanted.sum():.3g} of the tracking's intervals ahead; at most {MOST_PARTS:g} are allowed"
         )
     part = dt / np.maximum(wanted, 1)
-    return wanted.astype(np.int64), problem.integrator.counts(part), problem.process_noise.scale(part)
+    return (
+        wanted.astype(np.int64),
+        problem.counts(part, float(estimate.times[-1]), float(at[-1]), estimate.mean[-1]),
+        problem.process_noise.scale(part),
+    )

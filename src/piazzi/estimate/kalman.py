@@ -169,9 +169,8 @@ def predict(problem: Problem, belief: Any, t: float, dt: float) -> Prediction:
     if not (np.isfinite(dt) and dt > 0):
         raise ValueError(f"dt is {dt} s; a prediction goes forward")
     x, P = _belief(problem, belief)
-    assert problem.integrator is not None
     interval = np.array([float(dt)])
-    count, scale = int(problem.integrator.counts(interval)[0]), float(problem.process_noise.scale(interval)[0])
+    count, scale = int(problem.counts(interval, float(t), float(t + dt), x)[0]), float(problem.process_noise.scale(interval)[0])
     Phi, Q = np.empty_like(P), np.empty_like(P)
     library = kernels.load(problem.spec("transition", problem.noise_fragment, "predict"))
     belief, noise = Belief(mean=x, covariance=P), problem.process_noise.covariance

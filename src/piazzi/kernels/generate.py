@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
+from piazzi.kernels.multistep import multistep_source
 from piazzi.kernels.outside import outside_source
 from piazzi.kernels.printer import function, in_time
 from piazzi.kernels.steps import adaptive_source, axes_source, kepler_source, runge_kutta_source
@@ -157,6 +158,8 @@ def _dynamics_source(model: Model) -> str:
 def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
     if scheme[0] == "runge-kutta":
         return runge_kutta_source(*scheme[1])
+    if scheme[0] == "gauss-jackson":
+        return runge_kutta_source(*DORMAND_PRINCE_8) + multistep_source(model, *scheme[1:])
     if scheme[0] == "adaptive":
         return adaptive_source(model, *scheme[1:])
     if scheme[0] == "kepler":

@@ -65,12 +65,27 @@ class Integrator:
         """Whether the method answers for its own step error, so that the number of substeps does not."""
         return False
 
+    @property
+    def needs_times(self) -> bool:
+        """Whether the length of its steps is chosen for the times of a run, so that it has none yet."""
+        return False
+
+    @property
+    def arc_scheme(self) -> tuple[Any, ...]:
+        """What the code of a whole arc depends on; () where an arc is one interval after the other."""
+        return ()
+
     def counts(self, intervals: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         """Substeps in each interval of that many seconds, int64 of the same shape."""
         if self.substeps is not None:
             same = np.empty(len(intervals), dtype=np.int64)
             same.fill(self.substeps)
             return same
+        if self.max_step is None:
+            raise ValueError(
+                f"{type(self).__name__} chooses its step for the times of a run: give max_step, or a problem from "
+                "problem.with_steps(times)"
+            )
         # an interval that is a whole number of steps up to rounding keeps that number
         count = np.ceil(intervals / self.max_step * (1 - 1e-12))
         if count.size and not count.max() < 2**53:

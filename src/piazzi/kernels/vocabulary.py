@@ -60,6 +60,11 @@ GAPS: int
 GAP: tuple[float, ...]
 NODE: tuple[float, ...]
 WEIGHT: tuple[float, ...]
+ORDER: int
+DRIVEN: int
+SLOT: int
+TOP: int
+HISTORY: int
 
 
 # functions of the language, as far as fragments use them
@@ -79,6 +84,17 @@ trial: Any
 trial_jacobian: Any
 panel: Any
 orbit_axes: Any
+predicted: Any
+corrected: Any
+between: Any
+driven: Any
+driven_of: Any
+positions: Any
+positions_of: Any
+doubled: Any
+doubled_of: Any
+joined: Any
+joined_of: Any
 first_rows: Any
 identity_rows: Any
 remember: Any
@@ -146,3 +162,15 @@ advance_border: Any
 update_bordered: Any
 width_of_row: Any
 record_belief: Any
+# written in fragments/gauss_jackson_*.py
+first_derivative: Any
+rates_of: Any
+stepped: Any
+rows_at: Any
+keep_rows: Any
+driven_rows: Any
+position_rows: Any
+doubled_rows: Any
+joined_rows: Any
+begin_derivatives: Any
+write_derivative: Any

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -43,12 +43,16 @@ def rates(spec: KernelSpec, entry: str, given: Given, x: Any, t: Any) -> Array:
     return out[0] if one else out
 
 
-def step(spec: KernelSpec, integrator: Integrator, given: Given, x: Any, dt: float, t: Any) -> tuple[Array, Array]:
-    """Next states and the derivative of the step."""
+def step(
+    spec: KernelSpec, counts: Callable[[Array, float, float, Array], Array], given: Given, x: Any, dt: float, t: Any
+) -> tuple[Array, Array]:
+    """Next states and the derivative of the step; `counts` says in how many substeps: of intervals, in a span from a state."""
     if not np.isfinite(dt):
         raise ValueError(f"dt is {dt} s; it must be finite")
     many, times, one = _states(spec.model, x, t)
-    n, count = spec.model.n, int(integrator.counts(np.array([abs(float(dt))]))[0])
+    n, length = spec.model.n, abs(float(dt))
+    interval = np.array([length])
+    count = max(int(counts(interval, at, at + length, y)[0]) for at, y in zip(times.tolist(), many, strict=True))
     out, Phi = np.empty((len(many), n)), np.empty((len(many), n, n))
     kernels.load(spec).evaluate_step(len(many), times, float(dt), count, many, given, out, Phi)
     return (out[0], Phi[0]) if one else (out, Phi)

@@ -10,16 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.kernels import Discrete, Integrator, Kepler, KernelSpec, RungeKutta4
+from piazzi.kernels import Discrete, Integrator, Kepler, KernelSpec, RungeKutta4, RungeKutta8
 from piazzi.kernels.bundle import Belief, Given
 from piazzi.kernels.outside import outside_fragments
 from piazzi.model import Model
 from piazzi.model.functions import STATION_TABLE
 from piazzi.problem import evaluation, manoeuvres, outside
+from piazzi.problem.arcs import Arc, Steps, arc
 from piazzi.problem.checks import Array, check_span, covariance, finite_vector, frozen, lock, numeric
 from piazzi.problem.constants import with_station_constants
 from piazzi.problem.epochs import check_near, epoch_given
 from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
+from piazzi.problem.stepping import chosen_steps
 from piazzi.problem.two_body import check_orbit_axes, check_two_body
 from piazzi.text import nearest, suggest
 
@@ -378,6 +380,11 @@ class Problem:
         moved = self.process_noise.axes != "states" and bool(self.process_noise.covariance.any())
         return self._integrated or moved or any(m.covariance.any() for m in self.manoeuvres)
 
+    @property
+    def is_noise_free(self) -> bool:
+        """Whether the motion is determined by its first state: no process noise, and manoeuvres without errors."""
+        return not (self.process_noise.covariance.any() or any(m.covariance.any() for m in self.manoeuvres))
+
     def prior_start(self, times: Array) -> float:
         """Time of the prior of a run over these epochs, in seconds."""
         return float(times[0]) if self.prior_time is None else float(self.prior_time)
@@ -408,7 +415,66 @@ class Problem:
         dt = np.empty_like(times)
         dt[0] = times[0] - start
         np.subtract(times[1:], times[:-1], out=dt[1:])
-        return start, self.integrator.counts(dt), self.process_noise.scale(dt)
+        return start, self.counts(dt, start, float(times[-1])), self.process_noise.scale(dt)
+
+    def counts(self, intervals: Array, start: float, end: float, first: Array | None = None) -> Array:
+        """Substeps in each interval of that many seconds, of a run over this span of times; see `steps`."""
+        integrator = self.integrator
+        assert integrator is not None
+        if integrator.needs_times:
+            integrator = RungeKutta8(max_step=self.steps(start, end, first).one)
+        return integrator.counts(intervals)
+
+    def steps(self, start: float, end: float, first: Array | None = None) -> Steps:
+        """The longest steps over a span of times, from a state at its start, the prior mean where none is given."""
+        if first is not None:
+            return chosen_steps(self, first, start, end)
+        if (start, end) not in self._steps:
+            self._steps[start, end] = chosen_steps(self, self.mean, start, end)
+        return self._steps[start, end]
+
+    @cached_property
+    def _steps(self) -> dict[tuple[float, float], Steps]:
+        return {}
+
+    def max_step(self, times: Array) -> float | None:
+        """Longest step, in seconds, of a run over these times; None where the integrator says it by other means."""
+        assert self.integrator is not None
+        return (
+            self.steps(self.prior_start(times), float(times[-1])).one
+            if self.integrator.needs_times
+            else self.integrator.max_step
+        )
+
+    def with_steps(self, times: Any) -> Problem:
+        """The problem with the steps that its tolerance asks for over these times as its `max_step`; else itself."""
+        assert self.integrator is not None
+        if not self.integrator.needs_times:
+            return self
+        at = numeric(times, "times").reshape(-1)
+        return replace(self, integrator=RungeKutta8(max_step=self.max_step(at)))
+
+    def arc(self, times: Any, first: Any = None, derivative: bool = True) -> Arc:
+        """States x_k (K, n) of one orbit at increasing times, and its transition matrices Phi(k, k - 1), (K - 1, n, n).
+
+        Parameters
+        ----------
+        times : (K,), s
+        first : (n,), optional
+            The state at the first of the times, after any manoeuvre there; default the prior mean.
+        derivative : bool
+            Whether the transition matrices are wanted; without them none are returned, (0, n, n), and none computed.
+
+        Raises
+        ------
+        ValueError
+            For times that do not increase, or a state of the wrong shape.
+        """
+        at = np.ascontiguousarray(numeric(times, "times").reshape(-1))
+        if not at.size or not np.isfinite(at).all() or not (at[1:] > at[:-1]).all():
+            raise ValueError("the times of an arc must be finite and increase, and there must be one")
+        x = self.mean if first is None else finite_vector(first, self.model.n, "first state", self.model.names)
+        return arc(self, at, x, self.steps(float(at[0]), float(at[-1]), None if first is None else x), derivative)
 
     # ---- the model's functions, for users ------------------------------------------------------------------------
 
@@ -422,8 +488,7 @@ class Problem:
 
     def step(self, x: Any, dt: float, t: Any = 0.0) -> tuple[Array, Array]:
         """The state `dt` seconds later and the derivative of that step, shapes (n,), (n, n) or (K, n), (K, n, n)."""
-        assert self.integrator is not None
-        return evaluation.step(self.spec("transition", "functions"), self.integrator, self._given_at(t, dt), x, dt, t)
+        return evaluation.step(self.spec("transition", "functions"), self.counts, self._given_at(t, dt), x, dt, t)
 
     def measure(self, station: str, x: Any, t: Any = 0.0) -> Array:
         """Noiseless measurement h of a station, (m,) or (K, m)."""

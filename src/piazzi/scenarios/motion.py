@@ -27,6 +27,7 @@ INTEGRATORS: Mapping[str, type[Integrator]] = {
     "rk4": kernels.RungeKutta4,
     "dopri5": kernels.DormandPrince5,
     "rk8": kernels.RungeKutta8,
+    "gauss-jackson": kernels.GaussJackson,
     "runge-kutta": kernels.RungeKutta,
     "adaptive": kernels.DormandPrince,
     "kepler": kernels.Kepler,

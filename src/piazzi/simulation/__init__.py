@@ -10,6 +10,7 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.problem import Gaussian, Problem, Tracking, Truth
+from piazzi.problem.arcs import arc
 from piazzi.problem.checks import Array, check_span, finite_vector, numeric
 from piazzi.problem.inputs import Inputs
 from piazzi.simulation.rule import MOST_DRAWS, NoTruthError, Rule
@@ -106,9 +107,14 @@ def propagate(
     row_station, first_row = np.tile(index, K), np.arange(K + 1, dtype=np.int64) * len(index)
     states, z = np.empty((K, n)), np.empty((K * len(index), M))
     actual.cover(start, float(epochs[-1]))
-    library = kernels.load(actual.spec("transition", actual.noise_fragment, "simulate"))
     run, p, measured, _ = Inputs(epochs, start, count, scale, first_row, z, row_station).bundles(actual)
-    library.run_simulation(run, p, measured, first, w, np.empty((n, n)), states)
+    if actual.is_noise_free:
+        nodes = np.append(start, epochs) if start < epochs[0] else epochs
+        states[:] = arc(actual, nodes, first, actual.steps(start, float(epochs[-1]), first), derivative=False).x[-K:]
+        kernels.load(actual.spec("transition", "measurements")).run_measurements(run, p, measured, states)
+    else:
+        library = kernels.load(actual.spec("transition", actual.noise_fragment, "simulate"))
+        library.run_simulation(run, p, measured, first, w, np.empty((n, n)), states)
     check_finite(problem, epochs, first, states)
     if v is not None:
         z += np.einsum("jab,jb->ja", np.linalg.cholesky(problem.station_noise)[row_station], v)

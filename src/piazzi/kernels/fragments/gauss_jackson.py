@@ -1,0 +1,73 @@
+"""A smooth arc by Gauss-Jackson's method: equal steps with one evaluation each, begun by steps of order 8.
+
+A rate is evaluated where the sums of the earlier ones predict the state.  What is told of an epoch is corrected with the
+newest rate; one within a step is reached from the step's end along the polynomial through the rates, whose order is the
+method's.  `F` holds the rates, newest first from `at`; `v1` and `q2` their first and second sums, capitals the same of rows.
+"""
+
+from piazzi.kernels.vocabulary import *  # noqa: F403
+
+
+@inline
+def keep(F, at, f, K):
+    """Write the rates of what is driven into a slot of the history."""
+    store(F, at, driven(f))
+    keep_rows(F, at, driven_rows(K))
+
+
+@inline
+def rates_at(F, at):
+    """Rates of the state in a slot."""
+    return load_vector(F, at, DRIVEN)
+
+
+@entry
+def run_multistep(K: int, t: Array, steps: int, p: Given, x: Array, Phi: Array) -> None:
+    F, kept = scratch(HISTORY), scratch(NN)
+    begin_derivatives(kept)
+    begin, h = t[0], (t[K - 1] - t[0]) / steps
+    y, R = load_vector(x, 0, N), first_derivative()
+    at = HISTORY
+    k = 1
+    for i in range(ORDER):
+        here = begin + i * h
+        if i > 0:
+            y, R = stepped(here - h, h, y, R, p)
+        f, G = rates_of(here, y, R, p)
+        at -= SLOT
+        keep(F, at, f, G)
+        while i + 1 < ORDER and k < K and t[k] <= here + h:
+            z, Z = stepped(here, t[k] - here, y, R, p)
+            store(x, k * N, z)
+            write_derivative(Phi, k, Z, kept)
+            k += 1
+    sx, sv, SX, SV = corrected(F, at)
+    v1, V1 = (1.0 / h) * driven(y) - sv, (1.0 / h) * driven_rows(R) - SV
+    q2 = (1.0 / (h * h)) * positions(y) - doubled(sx) + doubled(v1)
+    Q2 = (1.0 / (h * h)) * position_rows(R) - doubled_rows(SX) + doubled_rows(V1)
+    for i in range(ORDER, steps + 1):
+        if at == 0:
+            for j in range(ORDER * SLOT):
+                F[TOP + j] = F[j]
+            at = TOP
+        here = begin + i * h
+        sx, sv, SX, SV = predicted(F, at)
+        z = joined(y, (h * h) * (q2 + doubled(sx)), h * (v1 + sv))
+        Z = joined_rows((h * h) * (Q2 + doubled_rows(SX)), h * (V1 + SV))
+        f, G = rates_of(here, z, Z, p)
+        at -= SLOT
+        keep(F, at, f, G)
+        new, NEW = v1 + driven(f), V1 + driven_rows(G)
+        if k < K and (t[k] <= here or i == steps):
+            sx, sv, SX, SV = corrected(F, at)
+            q, v = (h * h) * (q2 + doubled(sx)), h * (new + sv)
+            Q, V = (h * h) * (Q2 + doubled_rows(SX)), h * (NEW + SV)
+            while k < K and (t[k] <= here or i == steps):
+                s = (here - t[k]) / h
+                sx, sv, SX, SV = between(F, at, s)
+                store(x, k * N, joined(y, q - (s * h) * doubled(v) + (h * h) * doubled(sx), v - h * sv))
+                Z = joined_rows(Q - (s * h) * doubled_rows(V) + (h * h) * doubled_rows(SX), V - h * SV)
+                write_derivative(Phi, k, Z, kept)
+                k += 1
+        v1, V1 = new, NEW
+        q2, Q2 = q2 + doubled(v1), Q2 + doubled_rows(V1)
