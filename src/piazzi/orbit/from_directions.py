@@ -74,7 +74,8 @@ def laplace(
 
     Notes
     -----
-    Rates of the direction are those of a parabola through the three, so arcs must be short: the orbit meets the
+    Rates of the direction are those of a parabola through the three, so arcs must be short (those of the observer by the same
+    parabola are often the better ones, because both errors go together): the orbit meets the
     middle direction
     only, and `residual` says by how much it misses the others.
     Sources: Laplace (1780); Escobal (1965), ch. 7; Vallado (2013), section 7.3.1.
