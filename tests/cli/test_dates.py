@@ -35,6 +35,8 @@ def test_rows_with_dates_are_estimated_and_shown_with_dates(call, dated):
     shown = call("estimate", rows, "--scenario", dated, "--scale", "UTC").out
     assert "from 2016-12-31T23:59:59 UTC" in shown
     assert "(2017-01-01T00:00:00.25 UTC)" in shown
+    ahead = call("estimate", rows, "--scenario", dated, "--scale", "UTC", "--predict", "10min").out
+    assert "Predicted from t = 3601.25 s (2017-01-01T00:00:00.25 UTC)" in ahead
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,8 @@ def forecast_table(name: str, forecast: Forecast) -> Any:
     from rich.console import Group
     from rich.text import Text
 
-    title = f"Predicted from t = {forecast.start:g} s, {name}, without measurements"
+    date = _date(forecast.problem.epoch, forecast.start)
+    title = f"Predicted from t = {forecast.start:g} s{date}, {name}, without measurements"
     rows = []
     shows = [display_of(forecast.problem.model.unit(s), forecast.mean[:, i].tolist()) for i, s in enumerate(forecast.names)]
     for k, t in enumerate(forecast.times.tolist()):
