@@ -320,3 +320,54 @@ def test_passes_are_shown_as_bars(tmp_path):
     assert '"spans"' in page.read_text()
     whole = simulate(problem(visible=()))
     assert "passes" not in summary(problem(visible=()), whole, "") and "passes" not in to_dict(given, whole, "", 0, None)
+
+
+def test_a_gap_is_crossed_with_the_steps_of_the_times(tmp_path):
+    """An orbit: the estimate after a long gap is that of a run which has every time, most without a value."""
+    orbit = """
+    states = ["x", "y", "u", "v"]
+    [dynamics]
+    x = "u"
+    y = "v"
+    u = "-3.986e14*x/hypot(x, y)**3"
+    v = "-3.986e14*y/hypot(x, y)**3"
+    [sensors.fix]
+    visible = ["x - 6.5e6"]
+    [sensors.fix.components]
+    px = "x"
+    py = "y"
+    [[stations]]
+    name = "s"
+    noise = { sigma = [50.0, 50.0] }
+    [prior]
+    mean = [7e6, 0.0, 0.0, 7546.0]
+    sigma = [100.0, 100.0, 1.0, 1.0]
+    [times]
+    step = 20
+    count = 600
+    """
+    (tmp_path / "orbit.toml").write_text(orbit)
+    given, tracking = pz.load(tmp_path / "orbit.toml", seed=2)
+    assert np.diff(tracking.times).max() > 4000.0
+    times = np.arange(600) * 20.0
+    values = np.full((600, 2), np.nan)
+    values[np.searchsorted(times, tracking.times)] = tracking.values
+    found = pz.ExtendedKalmanFilter().estimate(given, tracking)
+    whole = pz.ExtendedKalmanFilter().estimate(given, pz.Tracking(times, values))
+    at = np.searchsorted(times, tracking.times)
+    sigma = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
+    assert (np.abs(found.mean - whole.mean[at]) < 1e-3 * sigma).all()
+    error = (found.mean - tracking.truth) / sigma
+    assert np.sqrt((error**2).mean()) < 3.0
+
+
+@pytest.mark.parametrize("kind", ["discrete", "noise per step"])
+def test_every_epoch_stays_where_what_happens_depends_on_how_many_there_are(kind):
+    sensor = pz.Sensor("s", {"z": "x"}, visible=["x"])
+    model = pz.Model(["x"], ["-x"], [sensor], discrete=kind == "discrete")
+    noise = None if kind == "discrete" else pz.ProcessNoise([4.0], per="step")
+    given = pz.Problem(model, pz.Gaussian([1.0], [1e-6]), noise, [pz.Station("s", "s", 1e-6)], prior_time=0.0)
+    tracking = simulate(given, times=np.arange(20.0))
+    assert_array_equal(tracking.times, np.arange(20.0))
+    assert_array_equal(np.isnan(tracking.values[:, 0]), tracking.truth[:, 0] <= 0)
+    assert 0 < np.isnan(tracking.values).sum() < 20

@@ -58,3 +58,8 @@ def in_passes(problem: Problem, tracking: Tracking) -> list[Pass]:
     """The passes where there are some to tell apart: any station has more than one; else none."""
     found = passes(problem, tracking) if problem.stations else []
     return found if len(found) > len({one.station for one in found}) else []
+
+
+def is_restricted(problem: Problem) -> bool:
+    """Whether any station does not measure at every epoch of a simulation: by rules of its sensor, or its schedule."""
+    return any(s.schedule is not None or problem.model.sensor(s.sensor).visible for s in problem.stations)

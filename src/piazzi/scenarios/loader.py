@@ -6,6 +6,7 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from piazzi.opening import opened
 from piazzi.problem import Problem, with_gauss_markov
 from piazzi.problem.checks import Array
 from piazzi.problem.epochs import epoch_given
+from piazzi.problem.gaps import is_restricted
 from piazzi.scenarios.equations import read_physics
 from piazzi.scenarios.motion import read_gauss_markov, read_integrator, read_manoeuvres
 from piazzi.scenarios.scenario import Picture, Scenario, read_plan, read_recording, read_times
@@ -164,6 +166,7 @@ def read_scenario(data: Mapping[str, Any], name: str, faults: Faults) -> Scenari
         if problem is not None and times is not None:
             _check_size(problem, times, faults)
             _check_schedules(problem, times, faults)
+            problem = _with_steps_of(problem, times)
     if faults or problem is None or times is None:
         return None
     return Scenario(name, title or name, problem, times, picture, plan, recording)
@@ -210,6 +213,15 @@ def _units(file: Table) -> Units:
         with file.faults.at("units"):
             return Units.parse(text)
     return Units()
+
+
+def _with_steps_of(problem: Problem, times: Array) -> Problem:
+    """The problem with steps as long in a gap of the measurements as between two times, where there may be gaps."""
+    given: Any = problem.integrator
+    substeps = getattr(given, "substeps", None)
+    if not is_restricted(problem) or len(times) < 2 or substeps is None or given.chooses_steps:
+        return problem
+    return replace(problem, integrator=replace(given, substeps=None, max_step=float(np.diff(times).max()) / substeps))
 
 
 def _check_schedules(problem: Problem, times: Array, faults: Faults) -> None:

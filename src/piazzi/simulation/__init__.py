@@ -12,9 +12,10 @@ from piazzi import kernels
 from piazzi.problem import Gaussian, Problem, Tracking, Truth
 from piazzi.problem.arcs import arc
 from piazzi.problem.checks import Array, check_span, finite_vector, numeric
+from piazzi.problem.gaps import is_restricted
 from piazzi.problem.inputs import Inputs
 from piazzi.simulation.rule import MOST_DRAWS, NoTruthError, Rule
-from piazzi.simulation.visibility import is_restricted, rules, seen
+from piazzi.simulation.visibility import rules, seen
 
 __all__ = [
     "MOST_DRAWS",
@@ -69,15 +70,19 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
 def _measured(problem: Problem, whole: Tracking, marks: Array) -> Tracking:
     """The rows that are marked, (K, S).
 
-    Where the prior is at the first epoch, whichever that is, it stays, as rows without a value, to be the same as simulated.
+    Where the prior is at the first epoch, whichever that is, it stays, as a row without a value, to be the same as simulated;
+    so does every epoch where what happens between two depends on which they are: steps, memories, noise per step.
     """
     if not marks.any():
         said = rules(problem, range(len(problem.stations)))
         raise ValueError(f"no station sees anything at these {len(whole.times)} times: {said}")
     z = np.where(marks.reshape(-1, 1), whole.values, np.nan)
     rows = marks.copy()
-    if problem.prior_time is None:
-        rows[0, :1] |= not rows[0].any()
+    model, noise = problem.model, problem.process_noise
+    if model.discrete or model.memory or (noise.per == "step" and noise.covariance.any()):
+        rows[~rows.any(axis=1), 0] = True
+    elif problem.prior_time is None:
+        rows[0, 0] |= not rows[0].any()
     kept, flat = rows.any(axis=1), rows.reshape(-1)
     names = None if whole.row_stations is None else whole.row_stations[flat]
     return Tracking(whole.row_times[flat], z[flat], names, whole.truth[kept], whole.epoch)

@@ -14,11 +14,6 @@ from piazzi.problem import Gaussian, Problem, Station
 from piazzi.problem.checks import Array
 
 
-def is_restricted(problem: Problem) -> bool:
-    """Whether any station does not measure at every epoch."""
-    return any(s.schedule is not None or problem.model.sensor(s.sensor).visible for s in problem.stations)
-
-
 def seen(problem: Problem, times: Array, states: Array) -> Array:
     """Which stations measure at epochs (K,) the true states (..., K, n): marks (..., K, S).
 

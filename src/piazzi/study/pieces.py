@@ -12,7 +12,7 @@ from piazzi.estimate.estimator import views_of
 from piazzi.estimate.kalman import ExtendedKalmanFilter
 from piazzi.estimate.width import DIFFUSE, prior_ratio
 from piazzi.problem import Problem
-from piazzi.simulation import is_restricted
+from piazzi.problem.gaps import is_restricted
 from piazzi.study.bound import bound_at, no_bound
 from piazzi.study.ensemble import filter_runs, library
 from piazzi.study.plan import Plan
