@@ -22,6 +22,7 @@ COMMANDS = (
     "report",
     "tracking",
     "difference",
+    "data",
 )
 
 
@@ -61,6 +62,7 @@ def piazzi() -> None:
       piazzi difference fit.oem truth.sp3       how far two orbits are apart
       piazzi report tracking.npz -o page.html   a self-contained interactive page
       piazzi scenarios list                     what is built in
+      piazzi data                               which data are used, how old
 
     Exit status: 0 done, 2 bad usage or input, 3 an estimator did not succeed.
     """

@@ -5,11 +5,13 @@ from piazzi.earth.bodies import BODIES, body
 from piazzi.earth.eop import EOP, EOPTable, EOPWarning, read_eop
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import GravityField, gravity_field, read_gravity
+from piazzi.earth.finding import use_data
 from piazzi.earth.formula import Formula
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
 from piazzi.earth.ilrs import ilrs_stations
 from piazzi.earth.rotation import FRAMES, rotation, rotation_rate, transform
 from piazzi.earth.satellites import LASER_SPHERES, LaserSphere, laser_sphere
+from piazzi.earth.space_weather import SpaceWeather, SpaceWeatherWarning, read_space_weather
 from piazzi.earth.station_files import read_stations
 from piazzi.earth.stations import (
     Coordinates,
@@ -25,8 +27,8 @@ from piazzi.earth.weather import Weather
 
 __all__ = [
     "BODIES", "EOP", "FRAMES", "LASER_SPHERES", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch", "Formula",
-    "GravityField", "LaserSphere", "Station", "StationList", "StationWarning", "Weather", "azimuth_elevation_range", "body",
-    "geodetic_to_position", "gravity_field", "ilrs_stations", "laser_sphere", "media", "pole_tide", "position_to_geodetic",
-    "read_eop", "read_gravity", "read_stations", "rotation", "rotation_rate", "solid_tide", "station_displacement",
-    "transform", "up_north_east",
+    "GravityField", "LaserSphere", "SpaceWeather", "SpaceWeatherWarning", "Station", "StationList", "StationWarning",
+    "Weather", "azimuth_elevation_range", "body", "geodetic_to_position", "gravity_field", "ilrs_stations", "laser_sphere",
+    "media", "pole_tide", "position_to_geodetic", "read_eop", "read_gravity", "read_space_weather", "read_stations",
+    "rotation", "rotation_rate", "solid_tide", "station_displacement", "transform", "up_north_east", "use_data",
 ]  # fmt: skip

@@ -132,9 +132,15 @@ def _contents(path: Path) -> str:
 
 def _segments(path: Path) -> list[Any]:
     try:
-        import jplephem  # noqa: F401
+        return kernel_segments(path)
     except ModuleNotFoundError:
         raise ValueError("reading a JPL kernel needs jplephem: pip install 'piazzi[jpl]'") from None
+
+
+def kernel_segments(path: Path) -> list[Any]:
+    """Segments of a binary SPK file; raises ValueError for another file, ModuleNotFoundError without jplephem."""
+    import jplephem  # noqa: F401
+
     try:
         return _opened(path, path.stat().st_mtime_ns)
     except (ValueError, IndexError, KeyError) as error:

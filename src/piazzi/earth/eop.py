@@ -17,6 +17,7 @@ import numpy as np
 
 from piazzi.earth import scales
 from piazzi.earth.delta_t import MODEL, delta_t, delta_t_error
+from piazzi.earth.finding import found
 from piazzi.earth.scales import Pole
 from piazzi.opening import opened
 
@@ -236,15 +237,28 @@ def _finals(lines: list[bytes], path: Path) -> EOPTable:
 
 @cache
 def tables() -> EOPTable:
-    """The tables of the package `astropy-iers-data`: EOP 20 C04 from 1962, then finals2000A with its predictions of a year."""
+    """The tables that are used: EOP 20 C04 from 1962, then finals2000A with its predictions of a year.
+
+    They are those of the package `astropy-iers-data`, and after them a file in the folders of data (`finding.data_folders`)
+    that was measured for longer.
+    """
     import astropy_iers_data as package
 
-    final, rapid = read_eop(package.IERS_B_FILE), read_eop(package.IERS_A_FILE)
-    later = rapid.mjd > final.mjd[-1]
+    known = joined(read_eop(package.IERS_B_FILE), read_eop(package.IERS_A_FILE))
+    for path in found("eop"):
+        other = read_eop(path)
+        if other.measured > known.measured and other.mjd[0] <= known.measured + 1.0:
+            known = joined(known, other)
+    return known
+
+
+def joined(table: EOPTable, later: EOPTable) -> EOPTable:
+    """A table to its last measured day, and another from there."""
+    keep, take = table.mjd <= table.measured, later.mjd > table.measured
     return EOPTable(
-        np.concatenate([final.mjd, rapid.mjd[later]]),
-        np.concatenate([final.daily_ut1_tai, rapid.daily_ut1_tai[later]]),
-        np.concatenate([final.daily_pole, rapid.daily_pole[later]]),
-        "EOP 20 C04 and finals2000A",
-        rapid.measured,
+        np.concatenate([table.mjd[keep], later.mjd[take]]),
+        np.concatenate([table.daily_ut1_tai[keep], later.daily_ut1_tai[take]]),
+        np.concatenate([table.daily_pole[keep], later.daily_pole[take]]),
+        f"{table.source}, {later.source}",
+        later.measured,
     )

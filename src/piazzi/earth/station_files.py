@@ -62,7 +62,7 @@ def read_stations(*paths: str | Path) -> StationList:
             surveys += stations_of(sinex, path.name)
             for site, rows in sinex.eccentricities.items():
                 offsets.setdefault(site, []).extend(rows)
-        elif re.search(rb"(?m)^\w\d\d[ \d]{3}\d\.\d", start):
+        elif re.search(rb"(?m)^\w\d\d [ \d]{2}\d\.\d{4}", start):
             found += read_observatories(path, notes)
         else:
             found += _toml(path)
