@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from tests.fuzz import mutate, tracked
+from tests.fuzz import columns, mutate, tracked
 from tests.fuzz.case import Case
 from tests.fuzz.child import End, call
 
@@ -520,8 +520,25 @@ class OpmFormat(tracked.Opm, Format):
     """Orbit Parameter and Mean Elements Messages."""
 
 
+class LaserFormat(columns.Laser, Format):
+    """Laser ranges and predictions."""
+
+
+class Sp3Format(columns.Sp3, Format):
+    """Precise orbits."""
+
+
+class AstrometryFormat(columns.Astrometry, Format):
+    """Astrometry in columns, separated values and XML."""
+
+
+class SurveillanceFormat(columns.Surveillance, Format):
+    """Observations of space surveillance."""
+
+
 FORMATS: dict[str, type[Format]] = {
     "scenario": Scenario, "csv": Csv, "npz": Npz, "nc": NetCdf, "checkpoint": Checkpoint, "follow": Follow,
     "log": StudyLog, "store": StudyStore, "expression": Expression,
     "tdm": TdmFormat, "oem": OemFormat, "opm": OpmFormat,
+    "laser": LaserFormat, "sp3": Sp3Format, "astrometry": AstrometryFormat, "surveillance": SurveillanceFormat,
 }  # fmt: skip

@@ -213,16 +213,16 @@ def _read_and_write() -> int:
 
     try:
         found = pz.read_ephemeris("a")
+        for arc in found.arcs:
+            if len(arc) == 1:
+                opm_text(arc, created="2020-01-01T00:00:00")
+        if found.arcs:
+            oem_text(found, created="2020-01-01T00:00:00")
+        for mean in found.mean:
+            omm_text(mean, created="2020-01-01T00:00:00")
     except (ValueError, OSError) as error:
         print("piazzi:", str(error), file=sys.stderr)
         return 2
-    for arc in found.arcs:
-        if len(arc) == 1:
-            opm_text(arc, created="2020-01-01T00:00:00")
-    if found.arcs:
-        oem_text(found, created="2020-01-01T00:00:00")
-    for mean in found.mean:
-        omm_text(mean, created="2020-01-01T00:00:00")
     return 0
 
 

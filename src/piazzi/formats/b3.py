@@ -67,11 +67,12 @@ def said_of(rows: Rows, shifts: dict[int, int], mend: bool, told: Conventions) -
     if "range" in measured:
         assumed.append("ranges are half of the way there and back")
     if shifts:
-        places = f"{len(shifts)} ranges contradict their neighbours by powers of ten, as in line {min(shifts)}"
+        count = f"{len(shifts)} range{'s' if len(shifts) > 1 else ''}"
+        where = f"with an exponent that contradicts the neighbours, as in line {min(shifts)}"
         if mend:
-            assumed.append(f"{places}; their exponents are mended")
+            assumed.append(f"{count} {where}: mended")
         else:
-            left_open.append(f"{places}; they are not used: --repair exponent mends them")
+            left_open.append(f"{count} {where}: not used; --repair exponent mends what is wrong")
     if "right_ascension" in measured:
         left_open.append("what directions are reduced to: --angles astrometric, --angles geocentric or --angles apparent")
         left_open.append("the axes of right ascension and declination: --frame EME2000")
