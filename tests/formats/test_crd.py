@@ -219,6 +219,22 @@ def test_each_mistake_has_one_line(tmp_path, old, new, what):
     assert "\n" not in str(error.value)
 
 
+def test_a_sigma_of_the_users_goes_before_the_usual_one(tmp_path):
+    path = crd(tmp_path)
+    table = pz.read_tracking(path, sigma="range=1m")
+    assert table.sigma.tolist() == [1.0] and table.assumed == ()
+    table = pz.read_tracking(path, sigma=["range.7839=2m"])
+    assert table.sigma.tolist() == [2.0]
+
+
+def test_the_station_delay_that_is_left_is_applied_once(tmp_path):
+    rows = "40 86000.0 0 0902 10 10 1.742 105320.0 3.8 16\n11 86390.5 0.058 0902 2 120.0 9 35.1"
+    raw = pz.read_tracking(crd(tmp_path, flags="0 0 0 0 0", rows=rows))
+    once = pz.formats.corrected(raw)
+    assert once.value[0] == pytest.approx((0.058 - 105320e-12) * C / 2, rel=1e-15)
+    assert pz.formats.corrected(once).value[0] == once.value[0]
+
+
 def test_designators():
     codes = {
         "9207002": "1992-070B",

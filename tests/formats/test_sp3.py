@@ -151,3 +151,20 @@ def test_each_mistake_has_one_line(tmp_path, old, new, what):
     with pytest.raises(ValueError, match=what) as error:
         pz.read_ephemeris(sp3(tmp_path, **{old: new}))
     assert "\n" not in str(error.value) and "a.sp3" in str(error.value)
+
+
+def test_fixes_have_the_accuracy_of_the_file_or_the_usual_one(tmp_path):
+    """0.1 m where there is no code; velocities, which follow from the positions, are used with a sigma of the user's only."""
+    path = sp3(tmp_path, **{"++         6  0": "++         0  0", "EP  55": "/* 55"})
+    table = pz.read_tracking(path)
+    assert np.all(table.sigma[table.of_kind("x", "y", "z")][:3] == 0.1)
+    assert table.assumed == ("sigma of positions of SP3: 0.1 m",) and table.open == ()
+    assert np.all(pz.read_tracking(path, sigma="2m").sigma[:3] == 2.0)
+
+
+def test_velocities_of_fixes(data_dir):
+    path = data_dir / "earth" / "sp3" / "nsgf.orb.stella.v00.sp3.gz"
+    table = pz.read_tracking(path)
+    moving = table.of_kind("vx", "vy", "vz")
+    assert len(table) == 600 and moving.sum() == 300 and not table.used[moving].any() and table.used[~moving].all()
+    assert pz.read_tracking(path, sigma="1mm/s").used.all()

@@ -17,6 +17,7 @@ _OPTIONS: tuple[tuple[str, str, str, bool], ...] = (
     ("corrections", "STATE", "Whether corrections of the file are applied or open.", False),
     ("interval", "SECONDS", "Over which range rates are averaged.", False),
     ("interval-reference", "PART", "Of that interval, what times are of: start, middle or end.", False),
+    ("repair", "WHAT", "Mend what contradicts its neighbours: exponent, of ranges of space surveillance.", False),
     ("time", "SCALE", "Time scale of dates, as GPS or BER=GPS; may be repeated.", True),
     ("sigma", "SIGMA", "Standard deviations, as 10m, range=10m or range.BER=10m; may be repeated.", True),
 )

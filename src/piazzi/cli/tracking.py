@@ -30,7 +30,7 @@ def command(files: tuple[str, ...], output_file: str | None, target: str | None,
 
     Objects, stations, kinds, spans, passes, gaps, the conventions that the files state, which corrections they have already,
     what is assumed, and what is open, with the option that would say it. Formats are recognised by what is in a file: TDM, CRD,
-    and as fixes OEM, OPM, SP3, CPF; .gz and .Z are read as they are.
+    MPC, ADES, B3, IOD, UK, RDE, and as fixes OEM, OPM, SP3, CPF; .gz and .Z are read as they are.
 
     Examples:
       piazzi tracking pass.tdm

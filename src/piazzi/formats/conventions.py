@@ -161,6 +161,29 @@ def with_conventions(observations: Observations, told: Conventions) -> Observati
     return replace(observations, segments=segments, open=left, sigma=sigma, tag=_tags(observations, told))
 
 
+def with_usual_sigmas(observations: Observations, told: Conventions, usual: Array | float, what: str) -> Observations:
+    """Observations with the standard deviations that are usual for their format, where neither file nor user says any.
+
+    `usual` is of each row, NaN where there is no such custom; `what` is listed as assumed where one was taken.
+    """
+    rows = np.isnan(observations.sigma) & np.isfinite(usual)
+    for rule in told.sigmas:
+        rows &= ~_covered(observations, rule)
+    if not rows.any():
+        return observations
+    sigma = np.asarray(usual) if rows.all() else np.where(rows, usual, observations.sigma)
+    return replace(observations, sigma=sigma, assumed=(*observations.assumed, what))
+
+
+def _covered(observations: Observations, rule: Sigma) -> Array:
+    """(J,) mask of the rows that a sigma of the user's is meant for."""
+    rows = observations.of_kind(*rule.kinds)
+    if rule.station is not None:
+        named = rule.station in observations.participants
+        rows = rows & (observations.station == observations.participants.index(rule.station)) if named else rows & False
+    return rows
+
+
 def _completed(segment: Segment, told: Conventions) -> Segment:
     """A segment with what is said of it where it says nothing."""
     new: dict[str, Any] = {

@@ -18,13 +18,14 @@ ADDED: Mapping[str, tuple[str, ...]] = {
     "range": ("range", "range_ru"),
     "rcs": ("radar_cross_section",),
     "receive": ("receive_frequency",),
+    "station delay": ("range",),  # of lasers
     "transmit": ("transmit_frequency",),
 }
 _DIRECTIONS = ("right_ascension", "declination")
 
 
 def corrected(observations: Observations) -> Observations:
-    """The same rows with the numbers added that TDM give as corrections and say are not applied.
+    """The same rows with the numbers added that files give as corrections and say are not applied.
 
     Corrections without a number, or that are applied, or of which the file does not say whether they are, stay as they are.
 

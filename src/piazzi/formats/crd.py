@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.earth import Epoch
-from piazzi.formats.conventions import Conventions
+from piazzi.formats.conventions import Conventions, with_usual_sigmas
 from piazzi.formats.crd_headers import CORRECTIONS, ONE_WAY, Session
 from piazzi.formats.crd_records import Group, parse
 from piazzi.formats.dates import Readings, instants
@@ -70,15 +70,16 @@ def read(data: bytes, name: str, told: Conventions) -> Observations:
         segment=group,
         files=(name,),
         line=line,
-        sigma=_by_group([SIGMA[s.kind] for s in sessions], of_pass, group),
         pressure=weather[0],
         temperature=weather[1],
         humidity=weather[2],
         tag=_by_group([TAGS.index(_TAG[g.event]) for g in laser.groups], np.arange(len(laser.groups)), group),
         used=_by_group([not g.noise for g in laser.groups], np.arange(len(laser.groups)), group),
-        assumed=tuple(f"sigma of laser ranges, {kind}: {SIGMA[kind]} m" for kind in dict.fromkeys(s.kind for s in sessions)),
         left_out=tuple(left_out.items()),
     )
+    for kind in dict.fromkeys(session.kind for session in sessions):
+        own = _by_group([SIGMA[kind] if s.kind == kind else np.nan for s in sessions], of_pass, group)
+        table = with_usual_sigmas(table, told, own, f"sigma of laser ranges, {kind}: {SIGMA[kind]} m")
     return table if keep.all() else table[keep]
 
 

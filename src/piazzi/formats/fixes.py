@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.formats.conventions import Conventions, with_usual_sigmas
 from piazzi.formats.ephemeris import Arc, Ephemeris
 from piazzi.formats.joining import concatenate
 from piazzi.formats.observations import Observations, Segment
@@ -15,10 +16,14 @@ Array = np.ndarray[Any, Any]
 POSITION, VELOCITY = ("x", "y", "z"), ("vx", "vy", "vz")
 
 
-def fixes_of(ephemeris: Ephemeris) -> Observations:
+USUAL = {"SP3": 0.1, "CPF": 0.1}  # m, of positions whose file says no accuracy
+
+
+def fixes_of(ephemeris: Ephemeris, told: Conventions) -> Observations:
     """Rows of all states, those of one state after another; NaN positions are left out and counted.
 
-    Sigmas are those of the states, or the roots of the diagonal of a covariance of the same instant and axes.
+    Sigmas are those of the states, or the roots of the diagonal of a covariance of the same instant and axes, or `USUAL`.
+    Velocities of SP3 and CPF have none: they follow from the positions, and are used only where the user gives them one.
     Raises ValueError where there is no state: mean elements are no measurements.
     """
     if not ephemeris.arcs:
@@ -27,9 +32,21 @@ def fixes_of(ephemeris: Ephemeris) -> Observations:
     lost = sum(int(np.isnan(arc.position).any(axis=1).sum()) for arc in ephemeris.arcs)
     reasons = {"states without a position": lost, "sets of mean elements": len(ephemeris.mean)}
     left_out = (*ephemeris.left_out, *((reason, count) for reason, count in reasons.items() if count))
+    if (usual := USUAL.get(ephemeris.format)) is not None:
+        rows = _usual(
+            replace(rows, assumed=ephemeris.assumed), told, usual, f"sigma of positions of {ephemeris.format}: {usual} m"
+        )
+        return replace(rows, open=ephemeris.open, left_out=left_out)
     known = [bool(np.isfinite(rows.sigma[rows.segment == i]).all()) for i in range(len(rows.segments))]
     open_ = ephemeris.open if all(known) else (*ephemeris.open, "standard deviations of fixes: --sigma x=...m")
     return replace(rows, assumed=ephemeris.assumed, open=open_, left_out=left_out)
+
+
+def _usual(rows: Observations, told: Conventions, sigma: float, what: str) -> Observations:
+    rows = with_usual_sigmas(rows, told, np.where(rows.of_kind(*POSITION), sigma, np.nan), what)
+    given = {kind for rule in told.sigmas for kind in rule.kinds}
+    unused = rows.of_kind(*(kind for kind in VELOCITY if kind not in given))
+    return replace(rows, used=~unused) if unused.any() else rows
 
 
 def _fixes(arc: Arc, file: str) -> Observations:

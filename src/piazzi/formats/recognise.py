@@ -109,7 +109,7 @@ def _tracking(path: str | os.PathLike[str], told: Conventions) -> Observations:
     if form.tracking is None:
         from piazzi.formats.fixes import fixes_of
 
-        return fixes_of(_reader(str(form.ephemeris))(data, name, told))
+        return fixes_of(_reader(str(form.ephemeris))(data, name, told), told)
     found: Observations = _reader(form.tracking)(data, name, told)
     return found
 

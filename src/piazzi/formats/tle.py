@@ -67,7 +67,7 @@ def _elements(name: str, title: str, first: tuple[int, str], second: tuple[int, 
     names = ("mean_motion", "eccentricity", "inclination", "ascending_node", "argument_of_pericentre", "mean_anomaly")
     factors = (2.0 * np.pi / _DAY, 1.0, _DEGREE, _DEGREE, _DEGREE, _DEGREE)
     said = {
-        "NORAD_CAT_ID": one[2:7].strip(), "CLASSIFICATION_TYPE": one[7].strip() or "U",
+        "NORAD_CAT_ID": _catalogue(name, k1, one[2:7]), "CLASSIFICATION_TYPE": one[7].strip() or "U",
         "EPHEMERIS_TYPE": one[62].strip() or "0", "ELEMENT_SET_NO": one[64:68].strip(), "REV_AT_EPOCH": two[63:68].strip(),
         "BSTAR": repr(_exponential(name, k1, "drag term", one[53:61])),
         "MEAN_MOTION_DOT": repr(_number(name, k1, "first derivative of the mean motion", one[33:43])),
@@ -81,6 +81,16 @@ def _elements(name: str, title: str, first: tuple[int, str], second: tuple[int, 
         centre="EARTH", frame="TEME", scale="UTC", said=tuple((k, v) for k, v in said.items() if v),
         elements=tuple((n, v * f) for n, v, f in zip(names, values, factors, strict=True)),
     )  # fmt: skip
+
+
+def _catalogue(name: str, number: int, text: str) -> str:
+    """Number of an object in the catalogue; beyond 99999 its first digits are a letter, A for 10, without I and O (alpha-5)."""
+    found = re.fullmatch(r"([A-HJ-NP-Z]?)(\d{4})|( *\d{1,5})", text, re.ASCII)
+    if not found:
+        _refuse(name, number, f"the object is {text!r}; it must be five digits, or a letter other than I and O and four")
+    if not found[1]:
+        return text.strip()
+    return f"{10 + 'ABCDEFGHJKLMNPQRSTUVWXYZ'.index(found[1])}{found[2]}"
 
 
 def _epoch(name: str, number: int, text: str) -> Epoch:
