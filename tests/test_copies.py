@@ -88,6 +88,7 @@ def samples():
         pz.Ralston(),
     ]
     steps += [pz.RungeKutta([[0, 0], [1, 0]], [0.5, 0.5]), pz.RungeKutta4(), pz.RungeKutta8(), pz.Taylor()]
+    steps += [pz.GaussJackson()]
     sessions = [
         pz.ExtendedKalmanFilter().start(problem),
         pz.UnscentedKalmanFilter().start(problem),
