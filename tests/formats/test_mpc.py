@@ -34,6 +34,7 @@ def test_ceres_as_piazzi_saw_her(data_dir):
     np.testing.assert_allclose(table.value[-2:], np.radians([15 * hours, degrees]), rtol=1e-14)
     (segment,) = table.segments
     assert (segment.angles, segment.frame, segment.tag) == ("astrometric", "ICRF", "receive")
+    assert {pz.formats.TAGS[k] for k in table.tag} == {"receive"}
     # two declinations are given to the minute, one right ascension to the second
     coarse = table.sigma[np.isfinite(table.sigma)] / ARCSECOND
     np.testing.assert_allclose(sorted(coarse), sorted([60 / math.sqrt(12)] * 2 + [15 / math.sqrt(12)]))

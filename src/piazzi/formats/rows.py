@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piazzi.formats.dates import Readings, instants
+from piazzi.formats.kinds import TAGS
 from piazzi.formats.observations import Observations, Segment
 
 _REALS = ("day", "seconds", "value", "sigma", "correlation", "time_sigma")
@@ -101,6 +102,7 @@ class Rows:
         return Observations(
             epoch=epoch,
             t=t,
+            tag=np.array([TAGS.index(one.tag or "") for one in self.segments])[segment],
             kinds=tuple(self.kinds),
             participants=tuple(self.people),
             segments=tuple(self.segments),
