@@ -11,6 +11,7 @@ import piazzi as pz
 from piazzi.kernels import build, cache
 from piazzi.problem import arcs, stepping
 from piazzi.problem.arcs import Steps
+from tests.model import test_functions
 from tests.references import differences, kepler
 from tests.solvers import orbits
 
@@ -136,6 +137,15 @@ def test_manoeuvres_begin_anew(epochs):
     unit = orbits.units(2)
     assert_allclose(found.x / unit, exact.x / unit, rtol=0, atol=1e-11)
     assert_allclose(found.Phi * unit / unit[:, None], exact.Phi * unit / unit[:, None], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("integrator", [pz.GaussJackson(max_step=0.02), pz.RungeKutta8(tolerance=1e-11), pz.DormandPrince()])
+def test_functions_from_outside_move_as_their_twins_in_symbols(integrator):
+    times = np.array([0.0, 0.5, 0.503, 3.0])
+    twins = (replace(test_functions.problem(one), integrator=integrator) for one in (True, False))
+    outside, inside = (twin.arc(times) for twin in twins)
+    assert_allclose(outside.x, inside.x, rtol=0, atol=1e-11)
+    assert_allclose(outside.Phi, inside.Phi, rtol=0, atol=1e-9)
 
 
 def test_states_alone_are_those_with_derivatives():
