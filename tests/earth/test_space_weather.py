@@ -92,6 +92,8 @@ def test_outside_is_refused_with_the_span(written):
         ("266.3,266.4,OBS", "266.3,266.4,XYZ", "line 4: data type 'XYZ'"),
         (",1.0,5,343", ",1.0,343", "line 4: 30 cells, where the header has 31"),
         ("238.2,238.2", "-38.2,238.2", "line 5: '-38.2' is neither a flux nor an index"),
+        ("1957-10-03", "99999999999-10-03", "line 4: '99999999999-10-03' is no date"),
+        ("CP,C9,ISN", "CP,CP,CP,ISN", "line 2: 31 cells, where the header has 32"),
         ("AP_AVG", "APAVG", "no column AP_AVG"),
         ("DATE,BSRN", "DATES,BSRN", "no space weather of CelesTrak"),
     ],

@@ -121,7 +121,8 @@ def read_space_weather(path: str | Path) -> SpaceWeather:
 
 
 def _csv(path: Path, lines: list[str]) -> list[_Row]:
-    columns = {name: i for i, name in enumerate(lines[0].split(","))}
+    header = lines[0].split(",")
+    columns = {name: i for i, name in enumerate(header)}
     wanted = [*(f"AP{i}" for i in range(1, 9)), "AP_AVG", "F10.7_OBS", "F10.7_OBS_CENTER81", "F10.7_DATA_TYPE"]
     missing = [name for name in wanted if name not in columns]
     if missing:
@@ -131,8 +132,8 @@ def _csv(path: Path, lines: list[str]) -> list[_Row]:
         cells = line.split(",")
         if not line.strip():
             continue
-        if len(cells) != len(columns):
-            raise ValueError(f"{path.name}, line {number}: {len(cells)} cells, where the header has {len(columns)}")
+        if len(cells) != len(header):
+            raise ValueError(f"{path.name}, line {number}: {len(cells)} cells, where the header has {len(header)}")
         label = cells[columns["F10.7_DATA_TYPE"]]
         if label not in _TYPES:
             raise ValueError(f"{path.name}, line {number}: data type {label!r}; there are {', '.join(_TYPES)}")
@@ -157,7 +158,7 @@ def _row(path: Path, number: int, date: list[str], texts: list[str], kind: int) 
     try:
         year, month, day = (int(part) for part in date)
         mjd = float((dt.date(year, month, day) - dt.date(1970, 1, 1)).days + _UNIX)
-    except ValueError:
+    except (ValueError, OverflowError):
         raise ValueError(f"{path.name}, line {number}: {'-'.join(date)!r} is no date") from None
     values = [_number(path, number, text) for text in texts]
     mean = values[8] if np.isfinite(values[8]) else QUIET_AP
