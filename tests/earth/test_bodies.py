@@ -138,3 +138,21 @@ def test_unknown_bodies_are_met_with_the_nearest():
         earth.body("jupitre", Epoch("2016-02-13 TDB"))
     with pytest.raises(ValueError, match="pluto has no series; give a JPL kernel"):
         earth.body("pluto", Epoch("2016-02-13 TDB"))
+
+
+def test_a_damaged_kernel_is_said_to_be(kernel):
+    good = kernel.read_bytes()
+    for place, value, said in (
+        (1024, struct.pack("<d", 2.0), "goes to record 2"),  # a list that leads to itself
+        (1024, struct.pack("<d", 1e9), "damaged: record 2"),
+        (1040, struct.pack("<d", 1e9), "damaged: record 2"),
+        (1024 + 24 + 36, struct.pack("<i", 10**9), "cannot be read"),
+    ):
+        damaged = kernel.with_name(f"damaged-{place}-{value[-1]}.bsp")
+        damaged.write_bytes(good[:place] + value + good[place + len(value) :])
+        with pytest.raises(ValueError, match=said):
+            earth.body("sun", Epoch("2016-02-13 TDB"), kernel=damaged)
+    short = kernel.with_name("short.bsp")
+    short.write_bytes(good[:-8])
+    with pytest.raises(ValueError, match="bytes"):
+        earth.body("sun", Epoch("2016-02-13 TDB"), kernel=short)

@@ -6,6 +6,7 @@ The series are those of ERFA: Earth and Sun by `epv00` (VSOP2000), the Moon by `
 
 from __future__ import annotations
 
+import struct
 import warnings
 from collections.abc import Iterable
 from functools import lru_cache
@@ -16,7 +17,7 @@ import numpy as np
 
 from piazzi.earth import scales
 from piazzi.earth.epoch import Epoch, pairs
-from piazzi.opening import opened
+from piazzi.earth.finding import check_kernel
 from piazzi.text import nearest
 
 Array = np.ndarray[Any, Any]
@@ -26,6 +27,8 @@ _PLANETS = {"mercury": 1, "venus": 2, "mars": 4, "jupiter": 5, "saturn": 6, "ura
 # numbers of NAIF; of planets with moons, that of the barycentre, which kernels have
 _NAIF = {"sun": 10, "moon": 301, "earth": 399, **_PLANETS, "pluto": 9}
 BODIES = tuple(_NAIF)
+# what jplephem raises over a damaged file, besides ValueError
+_DAMAGED = (ValueError, IndexError, KeyError, TypeError, OverflowError, MemoryError, AssertionError, struct.error)
 
 
 def body(
@@ -106,7 +109,10 @@ def _from_kernel(path: Path, target: int, one: Array, two: Array) -> Array:
         for link in links:
             inside = (one + two >= link.start_jd) & (one + two <= link.end_jd) & ~held
             if np.any(inside) and link.center == links[0].center:
-                p, v = link.compute_and_differentiate(np.asarray(one)[inside], np.asarray(two)[inside])
+                try:
+                    p, v = link.compute_and_differentiate(np.asarray(one)[inside], np.asarray(two)[inside])
+                except _DAMAGED as error:
+                    raise ValueError(f"{path.name}: {_name(target)} cannot be read: {error}") from None
                 state[inside] = np.stack([p.T * 1e3, v.T * (1e3 / scales.DAY)], -2)
                 held |= inside
         if not np.all(held):
@@ -143,13 +149,15 @@ def kernel_segments(path: Path) -> list[Any]:
 
     try:
         return _opened(path, path.stat().st_mtime_ns)
-    except (ValueError, IndexError, KeyError) as error:
-        raise ValueError(f"{path.name} is no binary SPK kernel of JPL: {error}") from None
+    except _DAMAGED as error:
+        raise ValueError(
+            f"{path.name} cannot be read as a binary SPK kernel of JPL: {str(error) or type(error).__name__}"
+        ) from None
 
 
 @lru_cache(maxsize=8)
 def _opened(path: Path, changed: int) -> list[Any]:
     from jplephem.spk import SPK
 
-    opened(path).close()  # a pipe would never end
+    check_kernel(path)  # jplephem would go in circles
     return list(SPK.open(str(path)).segments)

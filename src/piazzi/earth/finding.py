@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
@@ -12,6 +13,7 @@ from piazzi.opening import opened
 
 KINDS = ("eop", "weather", "kernel", "stations", "field")
 _MOST = 1000  # files of a folder that are looked at
+_RECORD = 1024  # bytes of a DAF record
 _given: list[Path] = []
 
 
@@ -78,14 +80,24 @@ def found(kind: str) -> Iterator[Path]:
 
 
 def check_kernel(path: str | Path) -> None:
-    """Raise ValueError where a file is no binary SPK kernel, or ends before the address that its header has as free."""
-    with opened(path) as file:
-        head = file.read(1024)
-        size = file.seek(0, os.SEEK_END)
+    """Raise ValueError where a file is no binary SPK kernel, is cut short, or its list of contents leads in circles."""
     name = Path(path).name
-    if not head.startswith(b"DAF/SPK") or len(head) < 1024:
-        raise ValueError(f"{name} is no binary SPK kernel of JPL")
-    order: Literal["little", "big"] = "little" if head[88:96] == b"LTL-IEEE" else "big"
-    wanted = 8 * (int.from_bytes(head[84:88], order) - 1)
-    if size < wanted:
-        raise ValueError(f"{name} has {size:,} of at least {wanted:,} bytes")
+    with opened(path) as file:
+        head = file.read(_RECORD)
+        size = file.seek(0, os.SEEK_END)
+        if not head.startswith(b"DAF/SPK") or len(head) < _RECORD:
+            raise ValueError(f"{name} is no binary SPK kernel of JPL")
+        order: Literal["little", "big"] = "little" if head[88:96] == b"LTL-IEEE" else "big"
+        wanted = 8 * (int.from_bytes(head[84:88], order) - 1)
+        if size < wanted:
+            raise ValueError(f"{name} has {size:,} of at least {wanted:,} bytes")
+        record, seen = int.from_bytes(head[76:80], order), set[int]()
+        while record:
+            if record in seen or not 1 < record <= size // _RECORD:
+                raise ValueError(f"{name} is damaged: its list of contents goes to record {record}")
+            seen.add(record)
+            file.seek((record - 1) * _RECORD)
+            following, _, count = struct.unpack("<3d" if order == "little" else ">3d", file.read(24))
+            if not (0.0 <= count <= 25.0 and 0.0 <= following <= size // _RECORD):
+                raise ValueError(f"{name} is damaged: record {record} of its list of contents")
+            record = int(following)
