@@ -22,6 +22,7 @@ opening locks
 expressions
 model
 kernels
+outside
 earth
 formats
 problem tracking orbit

@@ -8,6 +8,7 @@ from piazzi.earth.fields import GravityField, gravity_field, read_gravity
 from piazzi.earth.finding import use_data
 from piazzi.earth.formula import Formula
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
+from piazzi.earth.gravity import Gravity
 from piazzi.earth.ilrs import ilrs_stations
 from piazzi.earth.rotation import FRAMES, rotation, rotation_rate, transform
 from piazzi.earth.satellites import LASER_SPHERES, LaserSphere, laser_sphere
@@ -27,8 +28,9 @@ from piazzi.earth.weather import Weather
 
 __all__ = [
     "BODIES", "EOP", "FRAMES", "LASER_SPHERES", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch", "Formula",
-    "GravityField", "LaserSphere", "SpaceWeather", "SpaceWeatherWarning", "Station", "StationList", "StationWarning",
-    "Weather", "azimuth_elevation_range", "body", "geodetic_to_position", "gravity_field", "ilrs_stations", "laser_sphere",
-    "media", "pole_tide", "position_to_geodetic", "read_eop", "read_gravity", "read_space_weather", "read_stations",
+    "Gravity", "GravityField", "LaserSphere", "SpaceWeather", "SpaceWeatherWarning", "Station", "StationList",
+    "StationWarning", "Weather", "azimuth_elevation_range", "body", "geodetic_to_position", "gravity_field", "ilrs_stations",
+    "laser_sphere", "media", "pole_tide", "position_to_geodetic", "read_eop", "read_gravity", "read_space_weather",
+    "read_stations",
     "rotation", "rotation_rate", "solid_tide", "station_displacement", "transform", "up_north_east", "use_data",
 ]  # fmt: skip

@@ -14,12 +14,16 @@ from piazzi.expressions.functions import TABLE as _TABLE
 from piazzi.kernels.compiler import entry_options
 from piazzi.kernels.lanes import (
     alike,
+    by_lanes,
     ceil,
+    each_lane,
+    eight,
     elementary,
     fused,
     gathered,
     heaviside,
     identity,
+    load_eights,
     load_lanes,
     load_matrices,
     load_matrix,
@@ -37,6 +41,7 @@ from piazzi.kernels.lanes import (
     store,
     store_lanes,
     store_packs,
+    sums_of_eight,
     unit,
     vector,
 )
@@ -74,6 +79,12 @@ def entry(function: Callable[..., Any]) -> Any:
 
 
 unless_missing = inline(_unless_missing)
+
+
+@inline
+def store_eight(a: Any, at: Any, value: Any) -> None:
+    """Write a register of eight numbers from position `at`."""
+    store_packs(a, at, vector(value), 8)  # type: ignore[call-arg]
 
 
 @inline

@@ -36,7 +36,7 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
-def vector(*entries: float) -> Array:
+def vector(*entries: Any) -> Array:
     """The vector of these entries."""
     return np.array(entries, dtype=float)
 
@@ -134,6 +134,36 @@ def load_packs(a: Array, at: int, n: int, w: int) -> Array:
 def store_packs(a: Array, at: int, value: Array, w: int) -> None:
     """Write a vector or matrix from position `at`."""
     store(a, at, value)
+
+
+def by_lanes(one: Callable[..., Any], several: Callable[..., Any], *arguments: Any) -> Any:
+    """``one(*arguments)``: uncompiled code works on one problem at a time."""
+    return one(*arguments)
+
+
+def each_lane(function: Callable[..., Any], *arguments: Any) -> Any:
+    """``function(*arguments)``: uncompiled code works on one problem at a time."""
+    return function(*arguments)
+
+
+def eight(v: Array) -> Any:
+    """The entries of a vector of eight, to be worked on at once."""
+    return v
+
+
+def load_eights(a: Array, at: int, n: int) -> Any:
+    """The `n` registers of eight consecutive numbers each from position `at`."""
+    return a[at : at + 8 * n].reshape(n, 8).copy()
+
+
+def store_eight(a: Array, at: int, value: Array) -> None:
+    """Write a register of eight numbers from position `at`."""
+    a[at : at + 8] = value
+
+
+def sums_of_eight(v: Array) -> Any:
+    """The sums of the rows."""
+    return v.sum(axis=1)
 
 
 def sign(x: float) -> float:

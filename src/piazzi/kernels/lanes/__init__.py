@@ -1,5 +1,6 @@
 """Small vectors and matrices in SIMD registers, for Numba."""
 
+from piazzi.kernels.lanes.calls import by_lanes, each_lane, eight, load_eights, sums_of_eight
 from piazzi.kernels.lanes.functions import ceil, heaviside, maximum, minimum, sign
 from piazzi.kernels.lanes.kinds import Matrix, Pack, Vector, element
 from piazzi.kernels.lanes.memory import (
@@ -30,12 +31,16 @@ __all__ = [
     "Pack",
     "Vector",
     "alike",
+    "by_lanes",
     "ceil",
+    "each_lane",
+    "eight",
     "element",
     "fused",
     "gathered",
     "heaviside",
     "identity",
+    "load_eights",
     "load_lanes",
     "load_matrices",
     "load_matrix",
@@ -53,6 +58,7 @@ __all__ = [
     "store",
     "store_lanes",
     "store_packs",
+    "sums_of_eight",
     "unit",
     "vector",
 ]
