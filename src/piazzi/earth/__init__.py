@@ -6,6 +6,7 @@ from piazzi.earth.eop import EOP, EOPTable, EOPWarning, read_eop
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import GravityField, gravity_field, read_gravity
 from piazzi.earth.finding import use_data
+from piazzi.earth.forces import Forces
 from piazzi.earth.formula import Formula
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
 from piazzi.earth.gravity import Gravity
@@ -23,14 +24,15 @@ from piazzi.earth.stations import (
     azimuth_elevation_range,
     up_north_east,
 )
+from piazzi.earth.tabulated import Body, Place, Rotation
 from piazzi.earth.tides import pole_tide, solid_tide, station_displacement
 from piazzi.earth.weather import Weather
 
 __all__ = [
-    "BODIES", "EOP", "FRAMES", "LASER_SPHERES", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch", "Formula",
-    "Gravity", "GravityField", "LaserSphere", "SpaceWeather", "SpaceWeatherWarning", "Station", "StationList",
-    "StationWarning", "Weather", "azimuth_elevation_range", "body", "geodetic_to_position", "gravity_field", "ilrs_stations",
-    "laser_sphere", "media", "pole_tide", "position_to_geodetic", "read_eop", "read_gravity", "read_space_weather",
-    "read_stations",
-    "rotation", "rotation_rate", "solid_tide", "station_displacement", "transform", "up_north_east", "use_data",
+    "BODIES", "EOP", "FRAMES", "LASER_SPHERES", "Body", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch",
+    "Forces", "Formula", "Gravity", "GravityField", "LaserSphere", "Place", "Rotation", "SpaceWeather",
+    "SpaceWeatherWarning", "Station", "StationList", "StationWarning", "Weather", "azimuth_elevation_range", "body",
+    "geodetic_to_position", "gravity_field", "ilrs_stations", "laser_sphere", "media", "pole_tide", "position_to_geodetic",
+    "read_eop", "read_gravity", "read_space_weather", "read_stations", "rotation", "rotation_rate", "solid_tide",
+    "station_displacement", "transform", "up_north_east", "use_data",
 ]  # fmt: skip

@@ -17,6 +17,7 @@ SOLAR_IRRADIANCE = 1361.0  # at one astronomical unit
 SOLAR_PRESSURE = SOLAR_IRRADIANCE / SPEED_OF_LIGHT
 SUN_RADIUS = 695700e3
 MOON_RADIUS = 1737.4e3
+LOVE_K2 = 0.30190  # of the solid Earth, that of the permanent tide too
 
 _DE440 = "JPL DE440; Park et al. 2021, Astron. J. 161, 105"
 # m^3/s^2; of planets with moons, that of the system
@@ -57,6 +58,7 @@ def constants() -> tuple[Constant, ...]:
         Constant("mass of the Sun over that of the Earth, for tides of stations", SUN_MASS, "", tides),
         Constant("mass of the Moon over that of the Earth, for tides of stations", MOON_MASS, "", tides),
         *(Constant(f"Love or Shida number {name}", value, "", tides) for name, value in numbers.items()),
+        Constant("Love number k2, for the tide's potential", LOVE_K2, "", "IERS Conventions 2010, table 6.3"),
         Constant("solar irradiance at one astronomical unit", SOLAR_IRRADIANCE, "W/m^2", "IAU 2015 resolution B3"),
         Constant("pressure of sunlight at one astronomical unit", SOLAR_PRESSURE, "N/m^2", "irradiance over speed of light"),
         Constant("radius of the Sun", SUN_RADIUS, "m", "IAU 2015 resolution B3"),

@@ -52,7 +52,18 @@ def checked_functions(given: Mapping[str, Any], model: Model) -> dict[str, Recip
         if not hasattr(given[name], "block"):
             raise ValueError(f"function {name!r} is a signature only: the problem needs its data")
         out[name] = given[name]
+    _check_shared(out)
     return out
+
+
+def _check_shared(functions: Mapping[str, Recipe]) -> None:
+    """Raise ValueError where functions that read one table were made for different ones."""
+    first: dict[str, str] = {}
+    for name, recipe in functions.items():
+        shared = recipe.signature.shared
+        other = first.setdefault(shared, name) if shared else name
+        if functions[other].checksum != recipe.checksum:
+            raise ValueError(f"functions {other!r} and {name!r} read one table, {shared}, but differ in their data or epoch")
 
 
 def recipes_of(model: Model, functions: Mapping[str, Recipe], places: Sequence[Any]) -> tuple[Recipe, ...]:

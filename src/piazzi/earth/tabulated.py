@@ -1,0 +1,264 @@
+"""Orientation, bodies and stations as functions of equations: tables over time, made day by day from the same routines.
+
+Each is a polynomial by pieces of equal length that begin at multiples of it past 0h UTC of the epoch's day, so that values do
+not depend on the span that was asked for.  Days count 86400 s: behind a leap second, pieces begin a second before midnight,
+where the rate of UT1 steps (by 1e-14 rad/s at the most).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from math import floor
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from piazzi.earth import scales
+from piazzi.earth.bodies import body
+from piazzi.earth.epoch import Epoch
+from piazzi.earth.rotation import FRAMES, frame_named, rotation
+from piazzi.earth.scales import Orientation
+from piazzi.earth.stations import Station
+from piazzi.earth.tides import station_displacement
+from piazzi.model.functions import STATION_TERMS, Signature
+from piazzi.outside.evaluation import check_count, checksum, derivatives, value
+from piazzi.outside.pieces import Pieces, fitted
+
+Array = np.ndarray[Any, Any]
+DAY = scales.DAY
+_UTC_FROM = -1262304000.0  # s past J2000.0: 1960; before it days begin at 0h TT
+
+
+class _Daily(Protocol):
+    """A recipe whose values are known at any instants."""
+
+    epoch: Epoch
+    TERMS: ClassVar[int]
+    LENGTH: ClassVar[float]
+
+    def __hash__(self) -> int: ...
+    def at(self, epochs: list[Epoch]) -> Array: ...
+
+
+class _Tabulated:
+    """What tables over time have in common; `columns` is the signature of the table, which calls may wrap."""
+
+    TERMS: ClassVar[int] = 10
+    LENGTH: ClassVar[float] = DAY
+    epoch: Epoch
+
+    @property
+    def span(self) -> None:
+        """Known at any time."""
+        return
+
+    def pieces(self, first: float, last: float) -> Pieces:
+        """The polynomials from the day of `first` to that of `last` (s)."""
+        midnight = -sum(_of_day(self.epoch))
+        a, b = (floor((t - midnight) / DAY) for t in (first, last))
+        coefficients = np.concatenate([_day(self, k) for k in range(a, b + 1)])
+        zero = np.zeros(coefficients.shape[2])
+        return Pieces(midnight + a * DAY, self.LENGTH, coefficients, zero, zero)
+
+    def block(self, first: float, last: float) -> Array:
+        """The data for these times, as kernels read them."""
+        return self.pieces(first, last).block
+
+    def _columns(self, t: float, count: int) -> tuple[Array, Array]:
+        """The columns of the table and their time derivatives at `t`, by the function that kernels compile."""
+        table, data = Signature.of_table(count, self.TERMS), self.block(t, t)
+        return np.array(value(table, data, t)), derivatives(table, data, t)[:, 0]
+
+
+def _of_day(epoch: Epoch) -> tuple[float, float]:
+    """Seconds of the day of UTC, whole and the rest."""
+    seconds, fraction = epoch.reading("UTC" if epoch.whole > _UTC_FROM else "TT")[2:]
+    return seconds, fraction
+
+
+@lru_cache(maxsize=2048)
+def _day(recipe: _Daily, number: int) -> Array:
+    """Coefficients of all pieces of one day, counted from that of the epoch."""
+    seconds, fraction = _of_day(recipe.epoch)
+    midnight = Epoch.at(recipe.epoch.whole - seconds + number * DAY, recipe.epoch.fraction - fraction)
+    count = round(DAY / recipe.LENGTH)
+    found = fitted(lambda times: recipe.at([midnight + t for t in times.tolist()]), 0.0, recipe.LENGTH, count, recipe.TERMS)
+    coefficients = found.coefficients
+    coefficients.flags.writeable = False
+    return coefficients
+
+
+@dataclass(frozen=True)
+class Rotation(_Tabulated):
+    """Turns components in one frame into those in another at a time: ``(t, x, y, z)`` to three.
+
+    Both directions between two frames read one table of nine numbers.  It differs from `rotation` by less than 1e-11 rad.
+
+    Parameters
+    ----------
+    from_, to : names of frames
+    epoch : the instant of t = 0, that of the problem
+    eop : orientation of the Earth; default the tables of the IERS
+    """
+
+    TERMS: ClassVar[int] = 10
+    LENGTH: ClassVar[float] = DAY / 12
+
+    from_: str
+    to: str
+    epoch: Epoch
+    eop: Orientation | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("from_", "to"):
+            object.__setattr__(self, name, frame_named(getattr(self, name)))
+
+    @property
+    def frames(self) -> tuple[str, str]:
+        """The frames in the order of the table."""
+        first, last = sorted((self.from_, self.to), key=FRAMES.index)
+        return first, last
+
+    @cached_property
+    def signature(self) -> Signature:
+        """The form of the function."""
+        partials = tuple((i, j) for i in range(3) for j in range(4))
+        back = self.frames != (self.from_, self.to)
+        return Signature("rotation", 4, 3, partials, self.TERMS, transposed=back, shared=" ".join(self.frames))
+
+    @cached_property
+    def checksum(self) -> str:
+        """Hash of what the table is."""
+        return checksum("rotation", self.frames, self.epoch.whole, self.epoch.fraction, _orientation(self.eop))
+
+    def at(self, epochs: list[Epoch]) -> Array:
+        """The nine numbers, by rows, at instants, (K, 9)."""
+        return rotation(*self.frames, epochs, self.eop).reshape(-1, 9)
+
+    def matrix(self, t: float) -> tuple[Array, Array]:
+        """The matrix and its time derivative."""
+        R, rate = (a.reshape(3, 3) for a in self._columns(t, 9))
+        return (R.T, rate.T) if self.signature.transposed else (R, rate)
+
+    def value(self, *arguments: float) -> tuple[float, ...]:
+        """The components along the other axes, at t, x, y, z."""
+        check_count(self.signature, arguments)
+        return tuple((self.matrix(arguments[0])[0] @ np.array(arguments[1:])).tolist())
+
+    def derivatives(self, *arguments: float) -> Array:
+        """The derivatives by t, x, y, z, (3, 4)."""
+        check_count(self.signature, arguments)
+        R, rate = self.matrix(arguments[0])
+        return np.column_stack([rate @ np.array(arguments[1:]), R])
+
+
+@dataclass(frozen=True)
+class Body(_Tabulated):
+    """Where Sun, Moon or a planet is seen from the centre of the Earth, m on the axes of the GCRF: ``(t)`` to three.
+
+    Parameters
+    ----------
+    name : of a body, as `body` takes it
+    epoch : the instant of t = 0, that of the problem
+    kernel : a kernel of JPL; default the series
+    center : the body that it is seen from
+    """
+
+    name: str
+    epoch: Epoch
+    kernel: str | Path | None = None
+    center: str = "earth"
+
+    def __post_init__(self) -> None:
+        if self.kernel is None:
+            body(self.name, self.epoch, self.center)
+
+    @property
+    def signature(self) -> Signature:
+        """The form of the function."""
+        return Signature.of_table(3, self.TERMS)
+
+    @cached_property
+    def checksum(self) -> str:
+        """Hash of what the table is."""
+        where = None if self.kernel is None else str(self.kernel)
+        return checksum("body", self.name, self.center, where, self.epoch.whole, self.epoch.fraction)
+
+    def at(self, epochs: list[Epoch]) -> Array:
+        """Positions at instants, (K, 3)."""
+        return body(self.name, epochs, self.center, self.kernel)[0]
+
+    def value(self, *t: float) -> tuple[float, ...]:
+        """The position at `t`."""
+        check_count(self.signature, t)
+        return tuple(self._columns(t[0], 3)[0].tolist())
+
+    def derivatives(self, *t: float) -> Array:
+        """The velocity at `t`, (3, 1)."""
+        check_count(self.signature, t)
+        return self._columns(t[0], 3)[1][:, None]
+
+
+@dataclass(frozen=True)
+class Place(_Tabulated):
+    """Position and velocity of a station on the axes of the GCRF (m, m/s): ``(t)`` to six.
+
+    The plate's motion, and with `tides` those of the solid Earth and the pole, are in it.
+
+    Parameters
+    ----------
+    station : an `earth.Station`
+    epoch : the instant of t = 0, that of the problem
+    eop : orientation of the Earth; default the tables of the IERS
+    tides : whether tides move it
+    """
+
+    TERMS: ClassVar[int] = STATION_TERMS
+    LENGTH: ClassVar[float] = DAY / 6
+
+    station: Station
+    epoch: Epoch
+    eop: Orientation | None = None
+    tides: bool = True
+    signature: Signature = field(default=Signature.of_station(), init=False, repr=False)
+
+    @cached_property
+    def checksum(self) -> str:
+        """Hash of what the table is."""
+        of = self.station.coordinates, self.station.eccentricities, self.epoch.whole, self.epoch.fraction
+        return checksum("station", *of, _orientation(self.eop), self.tides)
+
+    def at(self, epochs: list[Epoch]) -> Array:
+        """Positions at instants, (K, 3)."""
+        place = self.station.position(epochs)
+        if self.tides:
+            place = place + station_displacement(place, epochs, self.eop)
+        return np.asarray((rotation("ITRF", "GCRF", epochs, self.eop) @ place[..., None])[..., 0])
+
+    def pieces(self, first: float, last: float) -> Pieces:
+        """Positions from the day of `first` to that of `last`, and velocities, which are their derivatives."""
+        places = super().pieces(first, last)
+        c = places.coefficients
+        powers = np.arange(self.TERMS - 1, 0, -1)[:, None] * (2.0 / self.LENGTH)
+        rates = np.concatenate([np.zeros_like(c[:, :1]), powers * c[:, :-1]], axis=1)
+        zero = np.zeros(6)
+        return Pieces(places.start, places.length, np.concatenate([c, rates], axis=2), zero, zero)
+
+    def value(self, *t: float) -> tuple[float, ...]:
+        """Position and velocity at `t`."""
+        check_count(self.signature, t)
+        return tuple(self._columns(t[0], 6)[0].tolist())
+
+    def derivatives(self, *t: float) -> Array:
+        """Velocity and acceleration at `t`, (6, 1)."""
+        check_count(self.signature, t)
+        return self._columns(t[0], 6)[1][:, None]
+
+
+def _orientation(eop: Orientation | None) -> Iterable[Any]:
+    """What tells one orientation of the Earth from another."""
+    daily = getattr(eop, "daily_ut1_tai", None)
+    return (repr(eop),) if daily is None else (getattr(eop, "source", ""), daily.tobytes().hex())
