@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from piazzi.model import Model, Parameter, Sensor
     from piazzi.orbit import kepler_transition, propagate_kepler
     from piazzi.orbit.difference import difference
+    from piazzi.outside.table import Table
     from piazzi.present.report import write_report
     from piazzi.problem import (
         Gaussian,
@@ -100,6 +101,7 @@ _WHERE = {
         "piazzi.estimate.prior": "with_prior_at",
         "piazzi.estimate.substeps": "choose_substeps substep_error",
         "piazzi.loading": "load",
+        "piazzi.outside.table": "Table",
         "piazzi.evaluate.comparison": "Comparison compare",
         "piazzi.evaluate.observable": "Observability",
         "piazzi.evaluate.observing": "observability",
@@ -119,9 +121,9 @@ __all__ = [
     "GaussJackson", "Gaussian", "Heun", "Huber", "Integrator", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow",
     "Manoeuvre", "Midpoint", "Model", "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem",
     "ProcessNoise", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother",
-    "SquareRootKalmanFilter", "Station", "Study", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated",
-    "WindowTrade", "choose_substeps", "compare", "difference", "earth", "formats", "kepler_transition", "load",
-    "observability", "orbit", "passes", "predict", "propagate_kepler", "read_ephemeris", "read_store", "read_tracking",
+    "SquareRootKalmanFilter", "Station", "Study", "Table", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter",
+    "Updated", "WindowTrade", "choose_substeps", "compare", "difference", "earth", "formats", "kepler_transition",
+    "load", "observability", "orbit", "passes", "predict", "propagate_kepler", "read_ephemeris", "read_store", "read_tracking",
     "simulate", "step_warning", "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip
 
