@@ -120,7 +120,7 @@ def predicted(comparison: Comparison, ahead: str) -> dict[str, Forecast]:
     import numpy as np
 
     from piazzi.cli.ahead import times_ahead
-    from piazzi.estimate.considered import has_considered
+    from piazzi.estimate.estimator import has_considered
 
     times = times_ahead(ahead, float(comparison.tracking.times[-1]))
     usable = {name: e for name, e in comparison.estimates.items() if np.isfinite([*e.mean[-1], *e.covariance[-1].flat]).all()}

@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from piazzi.estimate.estimator import Estimate
-from piazzi.problem import Gaussian, Problem, Tracking
+from piazzi.estimate.forecast import STEP, moved
+from piazzi.problem import Problem, Tracking
 from piazzi.simulation import wrapped
 
 JUMP = 1.0  # standard deviations of the estimate that a parameter's small change may bend it by
-STEP = 0.1  # of a parameter's sigma, to either side: small beside what bends, large beside rounding
 _Estimator = TypeVar("_Estimator")
 Run = Callable[[_Estimator, Problem, Tracking], Estimate]
 
@@ -40,13 +40,6 @@ def with_considered(run: Run[_Estimator]) -> Run[_Estimator]:
     return estimate
 
 
-def moved(problem: Problem, name: str, sigmas: float) -> Problem:
-    """The problem with another value of a considered parameter."""
-    given = problem.parameters[name]
-    value = given.mean[0] + sigmas * np.sqrt(given.covariance[0, 0])
-    return replace(problem, parameters={**problem.parameters, name: Gaussian(value, given.covariance)})
-
-
 def _inflated(nominal: Estimate, name: str, above: Estimate, below: Estimate) -> Estimate:
     """The estimate with the part of one parameter added to its covariances."""
     for side in (above, below):
@@ -70,11 +63,6 @@ def _inflated(nominal: Estimate, name: str, above: Estimate, below: Estimate) ->
     if nominal.delayed is not None and above.delayed is not None and below.delayed is not None:
         changes["delayed"] = _inflated(nominal.delayed, name, above.delayed, below.delayed)
     return replace(nominal, **changes)
-
-
-def has_considered(estimate: Estimate) -> bool:
-    """Whether the estimate tells what each considered parameter does to it: one that failed does not."""
-    return all(f"considered_{name}" in estimate.details for name in estimate.problem.considered)
 
 
 def nominal(estimator: Any, problem: Problem, tracking: Tracking) -> Estimate:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,8 +13,6 @@ from piazzi.problem.epochs import epoch_of
 
 if TYPE_CHECKING:
     import xarray
-
-    from piazzi.estimate.estimator import Estimate
 
 DETAIL = "detail_"
 
@@ -33,40 +31,31 @@ def tracking_to_dataset(problem: Problem, tracking: Tracking) -> xarray.Dataset:
     if tracking.truth is not None:
         own = "state" if tracking.truth.shape[1] == problem.model.n else "true_state"
         variables["truth"] = (("time", own), tracking.truth, {"long_name": "true state"})
-    return xr.Dataset(variables, coordinates, {"title": _label(problem.name), **_instant(problem, tracking)})
+    return xr.Dataset(variables, coordinates, {"title": label(problem.name), **instant(problem, tracking)})
 
 
-def estimate_to_dataset(estimate: Estimate) -> xarray.Dataset:
-    """Means, covariances and innovations with names and units, and the truth where it is known.
+def estimate_variables(
+    problem: Problem, tracking: Tracking, arrays: Mapping[str, Array]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables and coordinates of an estimate, given its mean, covariance, innovations and innovation_covariances by name.
 
     Dimensions: time (K), state and state_2 (n), row (J), component and component_2 (m).
     """
-    import xarray as xr
-
-    problem, tracking = estimate.problem, estimate.tracking
+    names = np.array(problem.model.names, dtype=object)
     variables = _rows(problem, tracking)
-    coordinates = _epochs(problem, tracking) | _places(problem, estimate.innovations.shape[1])
-    names = np.array(estimate.names, dtype=object)
-    variables["mean"] = (("time", "state"), estimate.mean, {"long_name": "estimated state"})
-    variables["covariance"] = (("time", "state", "state_2"), estimate.covariance, {"long_name": "covariance of the estimate"})
-    variables["innovation"] = (("row", "component"), estimate.innovations, {"long_name": "measurement minus prediction"})
-    variables["innovation_covariance"] = (("row", "component", "component_2"), estimate.innovation_covariances)
+    variables["mean"] = (("time", "state"), arrays["mean"], {"long_name": "estimated state"})
+    variables["covariance"] = (("time", "state", "state_2"), arrays["covariance"], {"long_name": "covariance of the estimate"})
+    variables["innovation"] = (("row", "component"), arrays["innovations"], {"long_name": "measurement minus prediction"})
+    variables["innovation_covariance"] = (("row", "component", "component_2"), arrays["innovation_covariances"])
     if tracking.truth is not None and tracking.truth.shape[1] == len(names):
         variables["truth"] = (("time", "state"), tracking.truth, {"long_name": "true state"})
-    for key, value in estimate.details.items():
-        if isinstance(value, np.ndarray):
-            variables[DETAIL + key] = (tuple(f"{key}_{i}" for i in range(value.ndim)), value)
-    attributes = {
-        "view": estimate.view, "iterations": int(estimate.iterations), "seconds": float(estimate.seconds),
-        "success": int(estimate.success), "message": _label(estimate.message), "details": json.dumps(plain_details(estimate)),
-        **_instant(problem, tracking),
-    }  # fmt: skip
-    return xr.Dataset(variables, coordinates | {"state_2": ("state_2", names)}, attributes)
+    coordinates = _epochs(problem, tracking) | _places(problem, arrays["innovations"].shape[1])
+    return variables, coordinates | {"state_2": ("state_2", names)}
 
 
-def plain_details(estimate: Estimate) -> dict[str, Any]:
+def plain_details(details: Mapping[str, Any]) -> dict[str, Any]:
     """The details that are no arrays, as JSON keeps them; raises ValueError for one that it cannot keep."""
-    return {key: _plain(value, key) for key, value in estimate.details.items() if not isinstance(value, np.ndarray)}
+    return {key: _plain(value, key) for key, value in details.items() if not isinstance(value, np.ndarray)}
 
 
 def _rows(problem: Problem, tracking: Tracking) -> dict[str, Any]:
@@ -104,13 +93,13 @@ def _epochs(problem: Problem, tracking: Tracking) -> dict[str, Any]:
     }
 
 
-def _instant(problem: Problem, tracking: Tracking) -> dict[str, Any]:
+def instant(problem: Problem, tracking: Tracking) -> dict[str, Any]:
     """The instant that times are past: as text with its scale, and as whole seconds of TT past J2000.0 and a fraction."""
     epoch = epoch_of(problem, tracking)
     return {} if epoch is None else {"epoch": epoch.exact(), "epoch_tt": np.array([epoch.whole, epoch.fraction])}
 
 
-def _label(text: str) -> str:
+def label(text: str) -> str:
     """A text that any attribute can hold."""
     return text.replace("\0", " ")
 

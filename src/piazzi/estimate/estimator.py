@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -180,12 +181,35 @@ class Estimate(Locked):
         ValueError
             For a time before the last epoch, times that decrease or are not finite, or a last belief that is not finite.
         """
-        from piazzi.estimate.forecast import forecast
+        from piazzi.estimate.forecast import checked_times, forecast
 
-        return forecast(self, times)
+        at = checked_times(times, float(self.times[-1]))
+        last = self.mean[-1], self.covariance[-1]
+        if not (all(np.isfinite(a).all() for a in last) and has_considered(self)):
+            raise ValueError(f"nothing can be propagated: {self.message}")
+        considered = {name: self.details[f"considered_{name}"][-1] for name in self.problem.considered}
+        return forecast(self.problem, self.times, last, considered, at)
 
     def to_dataset(self) -> xarray.Dataset:
         """Times, means, covariances and innovations as a labelled dataset with units."""
-        from piazzi.estimate.dataset import estimate_to_dataset
+        import xarray as xr
 
-        return estimate_to_dataset(self)
+        from piazzi.estimate.dataset import DETAIL, estimate_variables, instant, label, plain_details
+
+        arrays = ("mean", "covariance", "innovations", "innovation_covariances")
+        own = {name: getattr(self, name) for name in arrays}
+        variables, coordinates = estimate_variables(self.problem, self.tracking, own)
+        for key, value in self.details.items():
+            if isinstance(value, np.ndarray):
+                variables[DETAIL + key] = (tuple(f"{key}_{i}" for i in range(value.ndim)), value)
+        attributes = {
+            "view": self.view, "iterations": int(self.iterations), "seconds": float(self.seconds),
+            "success": int(self.success), "message": label(self.message), "details": json.dumps(plain_details(self.details)),
+            **instant(self.problem, self.tracking),
+        }  # fmt: skip
+        return xr.Dataset(variables, coordinates, attributes)
+
+
+def has_considered(estimate: Estimate) -> bool:
+    """Whether the estimate tells what each considered parameter does to it: one that failed does not."""
+    return all(f"considered_{name}" in estimate.details for name in estimate.problem.considered)

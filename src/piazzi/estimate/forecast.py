@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.considered import STEP, has_considered, moved
 from piazzi.estimate.soundness import defect
 from piazzi.kernels.bundle import Belief, Beliefs, Run
-from piazzi.problem import Problem
+from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array, Locked, numeric
 
-if TYPE_CHECKING:
-    from piazzi.estimate.estimator import Estimate
-
 MOST_PARTS = 10**7
+STEP = 0.1  # of a considered parameter's sigma, to either side: small beside what bends, large beside rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,26 +70,29 @@ class Forecast(Locked):
         return "\n".join(lines)
 
 
-def forecast(estimate: Estimate, times: Any) -> Forecast:
-    """The estimate's last belief at later times; see `Estimate.predict`."""
-    start = float(estimate.times[-1])
-    at, last, P_last = _checked(times, start), estimate.mean[-1], estimate.covariance[-1]
-    if not (np.isfinite(last).all() and np.isfinite(P_last).all()):
-        raise ValueError(f"nothing can be propagated: {estimate.message}")
-    way = (at, start, *_parts(estimate, at))
-    if not has_considered(estimate):
-        raise ValueError(f"nothing can be propagated: {estimate.message}")
-    considered = {name: estimate.details[f"considered_{name}"][-1] for name in estimate.problem.considered}
+def forecast(
+    problem: Problem, epochs: Array, last: tuple[Array, Array], considered: Mapping[str, Array], at: Array
+) -> Forecast:
+    """The belief at the last of the epochs (K,) at later times; `considered` are its changes by a sigma of each parameter."""
+    start, (x, P_last) = float(epochs[-1]), last
+    way = (at, start, *_parts(problem, epochs, x, at))
     own = P_last - sum((np.outer(s, s) for s in considered.values()), np.zeros_like(P_last))
-    mean, P = _carried(estimate.problem, way, last, own)
+    mean, P = _carried(problem, way, x, own)
     for name, s in considered.items():
-        above, below = (_carried(moved(estimate.problem, name, side), way, last + side * s, own)[0] for side in (STEP, -STEP))
+        above, below = (_carried(moved(problem, name, side), way, x + side * s, own)[0] for side in (STEP, -STEP))
         s_then = (above - below) / (2 * STEP)
         P += s_then[:, :, None] * s_then[:, None, :]
     before, after = _sigma(P_last[None]), _sigma(P)
     with np.errstate(divide="ignore", invalid="ignore"):
         growth = np.where((after == 0) & (before == 0), 1.0, after / before)
-    return Forecast(estimate.problem, start, at, mean, P, growth)
+    return Forecast(problem, start, at, mean, P, growth)
+
+
+def moved(problem: Problem, name: str, sigmas: float) -> Problem:
+    """The problem with another value of a considered parameter."""
+    given = problem.parameters[name]
+    value = given.mean[0] + sigmas * np.sqrt(given.covariance[0, 0])
+    return replace(problem, parameters={**problem.parameters, name: Gaussian(value, given.covariance)})
 
 
 def _carried(problem: Problem, way: tuple[Any, ...], x: Array, P: Array) -> tuple[Array, Array]:
@@ -112,7 +113,8 @@ def _sigma(covariance: Array) -> Array:
         return np.asarray(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
 
 
-def _checked(times: Any, start: float) -> Array:
+def checked_times(times: Any, start: float) -> Array:
+    """Times (P,) that do not decrease, none before `start`; raises ValueError for others."""
     at = np.array(numeric(times, "times").reshape(-1))
     if not at.size:
         raise ValueError("there are no times to predict")
@@ -129,16 +131,15 @@ def _checked(times: Any, start: float) -> Array:
     return at
 
 
-def _parts(estimate: Estimate, at: Array) -> tuple[Array, Array, Array]:
+def _parts(problem: Problem, epochs: Array, x: Array, at: Array) -> tuple[Array, Array, Array]:
     """The way to each time: in how many parts, the substeps of a part, and its noise scale.
 
     Equal parts no longer than the tracking's median interval: a fixed number of substeps, a step that is the model itself and
     noise per step all mean one such interval.
     """
-    problem = estimate.problem
-    known = estimate.times if problem.prior_time is None else np.append(problem.prior_time, estimate.times)
+    known = epochs if problem.prior_time is None else np.append(problem.prior_time, epochs)
     usual = [gap for gap in np.diff(known).tolist() if gap > 0]
-    dt = np.diff(at, prepend=estimate.times[-1])
+    dt = np.diff(at, prepend=epochs[-1])
     wanted = np.ceil(dt / np.median(usual) * (1 - 1e-9)) if usual else np.sign(dt)
     if wanted.sum() > MOST_PARTS:
         raise ValueError(
@@ -147,6 +148,6 @@ def _parts(estimate: Estimate, at: Array) -> tuple[Array, Array, Array]:
     part = dt / np.maximum(wanted, 1)
     return (
         wanted.astype(np.int64),
-        problem.counts(part, float(estimate.times[-1]), float(at[-1]), estimate.mean[-1]),
+        problem.counts(part, float(epochs[-1]), float(at[-1]), x),
         problem.process_noise.scale(part),
     )

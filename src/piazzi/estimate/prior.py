@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from piazzi.estimate.considered import moved
+from piazzi.estimate.forecast import moved
 from piazzi.estimate.kalman import Prediction, predict
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
-from piazzi.estimate.dataset import DETAIL, estimate_to_dataset, plain_details, tracking_to_dataset
+from piazzi.estimate.dataset import DETAIL, plain_details, tracking_to_dataset
 from piazzi.estimate.estimator import Estimate, View
 from piazzi.io import hdf5
 from piazzi.problem import Problem, Tracking
@@ -80,9 +80,9 @@ def _root(problem: Problem, tracking: Tracking) -> xarray.Dataset:
 def _group(estimate: Estimate) -> xarray.Dataset:
     about = {
         "view": estimate.view, "iterations": int(estimate.iterations), "seconds": float(estimate.seconds),
-        "failure": estimate.failure, "details": plain_details(estimate),
+        "failure": estimate.failure, "details": plain_details(estimate.details),
     }  # fmt: skip
-    return _with_json(estimate_to_dataset(estimate), about=about)
+    return _with_json(estimate.to_dataset(), about=about)
 
 
 def _with_json(dataset: xarray.Dataset, **documents: Mapping[str, Any]) -> xarray.Dataset:
