@@ -106,6 +106,12 @@ def test_a_field_that_changes_is_that_of_the_epoch(data_dir):
     assert data.c[2, 0] == earth.read_gravity(path).at(EPOCH).c[2, 0] != earth.read_gravity(path).c[2, 0]
 
 
+def test_another_field_is_the_same_model(data_dir):
+    other = earth.Forces(data_dir / "earth" / "gravity" / "eigen-6s-truncated", 20, tides=("solid",))
+    assert other.field.radius != earth.Forces().field.radius
+    assert other.model() == earth.Forces(degree=2).model()
+
+
 def test_relativity():
     r, v, gm = X[:3], X[3:], 3.986004415e14
     R = np.linalg.norm(r)

@@ -13,6 +13,7 @@ from math import exp
 
 from piazzi.earth.constants import ASTRONOMICAL_UNIT, EARTH_SPIN, GM, LOVE_K2, SOLAR_PRESSURE, SPEED_OF_LIGHT, SUN_RADIUS
 from piazzi.earth.geodetic import ELLIPSOIDS
+from piazzi.earth.tides import RADIUS
 
 BODIES = tuple(name for name in GM if name not in ("earth", "pluto"))  # Pluto has no series
 EARTH_RADIUS, FLATTENING = ELLIPSOIDS["WGS84"]
@@ -67,11 +68,11 @@ def third_body(name: str) -> Force:
     return Force(f"{name}_on", text, pull)  # type: ignore[arg-type]
 
 
-def solid_tide(name: str, radius: float) -> Force:
+def solid_tide(name: str) -> Force:
     """The tide that a body raises in the Earth, degree 2, the permanent part included."""
     text = {
         f"{name}_cos": f"(x*{name}_x + y*{name}_y + z*{name}_z)/(r*{name}_r)",
-        f"{name}_swell": f"{LOVE_K2 / 2 * GM[name] * radius**5!r}/({name}_r**3*r**4)",
+        f"{name}_swell": f"{LOVE_K2 / 2 * GM[name] * RADIUS**5!r}/({name}_r**3*r**4)",
         f"{name}_up": f"{name}_swell*(3 - 15*{name}_cos**2)/r",
         f"{name}_toward": f"6*{name}_swell*{name}_cos/{name}_r",
     }
@@ -79,11 +80,11 @@ def solid_tide(name: str, radius: float) -> Force:
     return Force("tides_on", text, pull)  # type: ignore[arg-type]
 
 
-def relativity(gm: float) -> Force:
+def relativity() -> Force:
     """Schwarzschild's term of general relativity."""
     text = {
-        "relativity_c": f"{gm / SPEED_OF_LIGHT**2!r}/r**3",
-        "relativity_r": f"relativity_c*({4 * gm!r}/r - vx**2 - vy**2 - vz**2)",
+        "relativity_c": f"{GM['earth'] / SPEED_OF_LIGHT**2!r}/r**3",
+        "relativity_r": f"relativity_c*({4 * GM['earth']!r}/r - vx**2 - vy**2 - vz**2)",
         "relativity_v": "4*relativity_c*(x*vx + y*vy + z*vz)",
     }
     return Force("relativity_on", text, tuple(f"(relativity_r*{a} + relativity_v*v{a})" for a in "xyz"))  # type: ignore[arg-type]

@@ -88,14 +88,13 @@ class Forces:
 
     @cached_property
     def parts(self) -> tuple[Force, ...]:
-        """The forces as text."""
-        gm, radius = self.field.gm, self.field.radius
+        """The forces as text, without numbers of the field: another one compiles nothing."""
         empirical = tuple(name for name in EMPIRICAL if name in self.empirical)
         return (
             force_text.gravity(),
             *(force_text.third_body(name) for name in self.bodies),
-            *(force_text.solid_tide(name, radius) for name in ("sun", "moon") if self.tides),
-            *([force_text.relativity(gm)] if self.relativity else []),
+            *(force_text.solid_tide(name) for name in ("sun", "moon") if self.tides),
+            *([force_text.relativity()] if self.relativity else []),
             *([force_text.radiation()] if self.radiation else []),
             *([force_text.drag(self.air_height)] if self.drag else []),
             *([force_text.empirical(empirical)] if empirical else []),
