@@ -70,7 +70,7 @@ def rotation(origin: str, target: str, epoch: Epoch | Iterable[Epoch], eop: Orie
     EOPWarning
         Where the tables do not reach, with what that costs in metres on the ground; once.
     """
-    return _between(frame_named(origin), frame_named(target), *pairs(epoch), tables() if eop is None else eop)[0]
+    return _between(frame_named(origin), frame_named(target), *pairs(epoch), tables() if eop is None else eop, False)[0]
 
 
 def rotation_rate(
@@ -112,21 +112,23 @@ def _times(matrix: Array, vector: Array) -> Array:
     return np.asarray((matrix @ vector[..., None])[..., 0])
 
 
-def _between(origin: str, target: str, whole: Array, fraction: Array, eop: Orientation) -> tuple[Array, Array]:
-    """Matrix from one frame to another and its rate, by way of the GCRF, or of PEF where both lie on the Earth's side of it."""
+def _between(
+    origin: str, target: str, whole: Array, fraction: Array, eop: Orientation, rates: bool = True
+) -> tuple[Array, Array]:
+    """Matrix from one frame to another and its rate, by way of the GCRF; without `rates`, that of the equator is left out."""
     if origin == target or {origin, target} == {"GCRF", "ICRF"}:
         one = np.broadcast_to(np.eye(3), (*whole.shape, 3, 3)).copy()
         return one, np.zeros_like(one)
-    a, da = _from_gcrf(origin, whole, fraction, eop)
-    b, db = _from_gcrf(target, whole, fraction, eop)
+    a, da = _from_gcrf(origin, whole, fraction, eop, rates)
+    b, db = _from_gcrf(target, whole, fraction, eop, rates)
     back = np.swapaxes(a, -1, -2)
     return b @ back, db @ back + b @ np.swapaxes(da, -1, -2)
 
 
-def _from_gcrf(frame: str, whole: Array, fraction: Array, eop: Orientation) -> tuple[Array, Array]:
+def _from_gcrf(frame: str, whole: Array, fraction: Array, eop: Orientation, rates: bool) -> tuple[Array, Array]:
     """Matrix from the GCRF into a frame, and its rate."""
     if frame in TURNING:
-        return _earth_fixed(frame, whole, fraction, eop)
+        return _earth_fixed(frame, whole, fraction, eop, rates)
     matrix = _TABLE[frame](whole, fraction, eop)
     matrix = np.broadcast_to(matrix, (*whole.shape, 3, 3))
     return matrix, np.zeros_like(matrix)
@@ -142,12 +144,14 @@ def _celestial(whole: Array, fraction: Array, eop: Orientation) -> Array:
     return np.asarray(erfa.c2ixys(x + offsets[..., 2], y + offsets[..., 3], s))
 
 
-def _earth_fixed(frame: str, whole: Array, fraction: Array, eop: Orientation) -> tuple[Array, Array]:
+def _earth_fixed(frame: str, whole: Array, fraction: Array, eop: Orientation, rates: bool) -> tuple[Array, Array]:
     """GCRF to PEF or ITRF: W R3(ERA) Q and the derivative of each factor."""
     import erfa
 
     Q = _celestial(whole, fraction, eop)
-    dQ = (_celestial(whole + _STEP, fraction, eop) - _celestial(whole - _STEP, fraction, eop)) / (2.0 * _STEP)
+    dQ = np.zeros_like(Q)
+    if rates:  # which takes two thirds of the time
+        dQ = (_celestial(whole + _STEP, fraction, eop) - _celestial(whole - _STEP, fraction, eop)) / (2.0 * _STEP)
     turn, rate = _turn(whole, fraction, eop)
     R, dR = turn @ Q, rate @ Q + turn @ dQ
     if frame == "PEF":
