@@ -10,6 +10,7 @@ import pytest
 
 import piazzi as pz
 from piazzi.formats.lzw import unpacked
+from piazzi.formats.recognise import recognise
 from piazzi.formats.source import read_bytes
 
 
@@ -101,3 +102,15 @@ def test_what_is_of_no_format_is_refused_with_the_name(tmp_path):
         pz.read_tracking(path)
     with pytest.raises(OSError):
         pz.read_tracking(tmp_path / "b.tdm")
+
+
+@pytest.mark.parametrize(
+    "piece", [b'<?xml version="1.0"?>', b"<!-- a -->", b" \n", b"# a\n", b"COMMENT a\n", b"00 a\n", b"COD a\n", b"|"]
+)
+def test_many_of_what_comes_before_a_format_take_no_time(piece):
+    """What is gone over again for each of many repetitions would never end: here it takes milliseconds."""
+    import time
+
+    started = time.process_time()
+    assert recognise(piece * 1000 + b"x") is None
+    assert time.process_time() - started < 1.0

@@ -40,7 +40,7 @@ def _begins(pattern: bytes) -> Callable[[bytes], bool]:
 
 def _root(element: bytes) -> Callable[[bytes], bool]:
     """Whether the first element of an XML file has that name."""
-    compiled = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?.*?\?>|<!--.*?-->|\s)*<(?:\w+:)?" + element + rb"[\s/>]", re.S)
+    compiled = re.compile(rb"(?:\xef\xbb\xbf)?(?>\s+|<\?.*?\?>|<!--.*?-->)*+<(?:\w+:)?" + element + rb"[\s/>]", re.S)
     return lambda head: compiled.match(head) is not None
 
 
