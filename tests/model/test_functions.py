@@ -9,6 +9,7 @@ import pytest
 
 import piazzi as pz
 from piazzi.model.functions import Signature
+from piazzi.study.ensemble import Layout, filter_runs, simulate_runs
 
 C = 10.0  # speed of signals
 WELL = """@inline
@@ -301,3 +302,22 @@ def test_a_model_shows_its_calls_and_roots(capsys):
     problem().model.show()
     shown = capsys.readouterr().out
     assert "well" in shown and "root(" in shown and "at" in shown
+
+
+def test_runs_of_a_study_side_by_side_are_the_runs_one_by_one():
+    times = np.arange(0.0, 2.0, 0.1)
+    scaled = pz.ProcessNoise([0.0, 0.0, 1e-6, 1e-6], "second", "scaled")
+    p, rng = replace(problem(use=("delayed",)), process_noise=scaled), np.random.default_rng(4)
+    assert p.runs_in_ensemble
+    layout = Layout(p, times)
+    first = X + 0.05 * rng.standard_normal((11, 4))
+    truth, z = simulate_runs(layout, p, first, rng.standard_normal((11, 20, 4)), rng.standard_normal((11, 20, 2)))
+    mean, _, _ = filter_runs(layout, z, truth)
+    for run in range(11):
+        tracking = pz.Tracking(times, z[run], ["delayed"] * 20, truth[run])
+        np.testing.assert_allclose(mean[run], pz.ExtendedKalmanFilter().estimate(p, tracking).mean[-1], atol=1e-10)
+
+
+def test_a_study_tells_data_apart():
+    study = {s: pz.Study(problem(strength=s), [0.0, 1.0], [pz.Smoother()], runs=2).digest for s in (-1.0, -1.01)}
+    assert len(set(study.values())) == 2

@@ -41,12 +41,14 @@ class Clock:
         since = self.time if since is None else since
         if since is None:
             check_after(self.problem.manoeuvres, t)
+            self.problem.cover(t, t)
             return 0.0
         dt = float(t) - float(since)
         if dt == inf:
             check_span(since, t, "the time")
         if dt < 0:
             raise ValueError(f"time {t:g} s is before {since:g} s, where the estimate stands")
+        self.problem.cover(since, t)
         return dt
 
     def step(self, dt: float) -> tuple[int, float]:
@@ -138,7 +140,12 @@ class LiveFilter(Session):
         self._times, self._count, self._which = np.zeros(4), np.array([1]), np.array([0])
         self._times[3] = problem.prior_time or 0.0  # measurements before any prediction are at the time of the prior
         self._row, self._predicted_to, self._measured = np.full((1, m), np.nan), problem.prior_time, False
-        library = kernels.load(problem.spec("transition", problem.noise_fragment, *fragments, "filter_live"))
+        self._bind()
+
+    def _bind(self) -> None:
+        """The kernels on the arrays of this session."""
+        problem, self._given = self.problem, self.problem.given_bundle
+        library = kernels.load(problem.spec("transition", problem.noise_fragment, *self._settings[0], "filter_live"))
         base = Belief(mean=self._base_mean, covariance=self._base_covariance)
         self._predicted = Belief(mean=self._x_pred, covariance=self._P_pred)
         correction = Belief(mean=self._d, covariance=self._P)
@@ -147,10 +154,10 @@ class LiveFilter(Session):
             problem.process_noise.covariance,
             Innovations(nu=self.innovation[None], S=self.innovation_covariance[None]),
         )
-        self._predict = library.live_predict.bind(self._times, self._count, problem.given_bundle, Q, base, self._predicted)
+        self._predict = library.live_predict.bind(self._times, self._count, self._given, Q, base, self._predicted)
         self._update = library.live_update.bind(
             self._times,
-            problem.given_bundle,
+            self._given,
             measured_by(problem, self._row, self._which),
             self._predicted,
             correction,
@@ -168,6 +175,8 @@ class LiveFilter(Session):
         if self._measured and t == self._predicted_to:
             return
         dt = self._clock.interval(t, self._predicted_to if self._measured else None)  # a time that is refused changes nothing
+        if self.problem.given_bundle is not self._given:
+            self._bind()
         if self._measured:
             self._base_mean[:], self._base_covariance[:] = self.mean, self.covariance
             self._clock.time, self._measured = self._predicted_to, False

@@ -218,7 +218,7 @@ class LiveWindow(Session):
         self.widest[0] = np.max(np.sum(seen @ self._P_pred[k - window.first] * seen, axis=1), initial=self.widest[0])
 
     def _rebind(self) -> None:
-        if self._window.room != self._room:
+        if self._window.room != self._room or self._given is not self.problem.given_bundle:
             before = self._linear
             self._bind()
             for new, old in zip(self._linear, before, strict=True):  # the last linearisation is used as states leave
@@ -264,7 +264,8 @@ class LiveWindow(Session):
             loss=loss_numbers(p, self._loss),
             weights=np.ones(R),
         )
-        library, span, given = self._library, self._span, p.given_bundle
+        self._given = p.given_bundle
+        library, span, given = self._library, self._span, self._given
         innovations = Innovations(nu=self._nu, S=self._S)
         measured = measured_by(p, w.z, w.station)
         self._predict_once: Callable[[], None] = library.live_append.bind(span, run, given, chain)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection
 
+from piazzi.expressions import check, names
 from piazzi.expressions.functions import TABLE
 from piazzi.expressions.language import Call, Name, Negative, Node, Number, Power, Product, Sum, fold
 from piazzi.expressions.parse import parse
@@ -69,3 +70,20 @@ def _written(node: Node, parts: list[str]) -> str:
             return f"({text[1:]})"
         case Power():
             return f"({parts[0]}**{parts[1]})"
+
+
+def check_calls(text: str, allowed: Collection[str], outside: Collection[str]) -> None:
+    """Raise `ExpressionError` unless every name of an equation is allowed, within calls of functions from outside too."""
+    inside: list[str] = []
+
+    def stand_in(function: str, arguments: tuple[str, ...]) -> str:
+        inside.extend(arguments)
+        return f"{function}_{len(inside)}_value"
+
+    rest = split(text, outside, stand_in)
+    if not inside and rest == text:
+        check(text, allowed)
+        return
+    made = [name for part in (*inside, rest) for name in names(part) if name.endswith("_value")]
+    for part in (*inside, rest):
+        check(part, [*allowed, *made])

@@ -30,6 +30,7 @@ def fingerprint(problem: Problem, estimator: object) -> Array:
     words = repr((problem.model, problem.integrator, problem.prior_time, [s.name for s in problem.stations], kind, estimator))
     if problem.epoch is not None:  # those without one keep the digest that they had
         words += problem.epoch.exact()
+    words += "".join(f"{name} {checksum}" for name, checksum in problem.checksums.items())
     digest = hashlib.sha256(numbers + words.encode()).digest()
     return np.frombuffer(digest, dtype=np.uint8).astype(float)
 

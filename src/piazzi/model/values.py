@@ -65,7 +65,11 @@ def _define(d: Definition, out: dict[str, float], functions: Mapping[str, Any], 
         out.update(zip(d.names, _elsewhen(out, offset, functions, model), strict=False))
     elif d.function in functions:
         arguments = [evaluate(text, out) for text in d.texts]
-        out.update(zip(d.names, map(float, functions[d.function].value(*arguments)), strict=False))
+        try:
+            values = functions[d.function].value(*arguments)
+        except ValueError as error:
+            raise ValueError(f"{d.text}: {error}") from None
+        out.update(zip(d.names, map(float, values), strict=False))
 
 
 def _solve(d: Definition, out: dict[str, float], functions: Mapping[str, Any], model: Any) -> None:

@@ -14,7 +14,8 @@ import numpy as np
 
 from piazzi.model import Model
 from piazzi.model.functions import STATION_TABLE, Signature, signature_of
-from piazzi.problem.checks import Array, frozen
+from piazzi.outside.evaluation import aligned, whole_registers
+from piazzi.problem.checks import Array
 from piazzi.text import nearest
 
 DAY = 86400.0
@@ -100,9 +101,11 @@ def check_span(functions: Mapping[str, Any], first: float, last: float) -> None:
 
 def block_of(recipes: Sequence[Recipe], first: float, last: float) -> Array:
     """The block for a span of times."""
-    parts, places, at = [], [], len(recipes)
-    for recipe in recipes:
-        places.append(float(at))
-        parts.append(np.asarray(recipe.block(first, last), dtype=float))
-        at += len(parts[-1])
-    return frozen(np.concatenate([places, *parts])) if recipes else frozen([0.0])
+    parts = [np.asarray(recipe.block(first, last), dtype=float) for recipe in recipes]
+    ends = np.cumsum([whole_registers(count) for count in (len(recipes), *map(len, parts))])
+    block = aligned(max(int(ends[-1]), 1))
+    block[:] = 0.0
+    for i, (at, part) in enumerate(zip(ends, parts, strict=False)):
+        block[i], block[at : at + len(part)] = at, part
+    block.setflags(write=False)
+    return block

@@ -246,12 +246,14 @@ class Problem:
         ValueError
             Where a function has no values at some of them.
         """
-        if self._recipes:
-            told = self.__dict__.get("_told")
-            if not told or not told[0] <= first <= last <= told[1]:
-                self._tell(min(first, told[0]) if told else first, max(last, told[1]) if told else last)
-                return True
-        return False
+        if not self._recipes:
+            return False
+        outside.check_span(self.functions, first, last)
+        told = self.__dict__.get("_told")
+        if told and told[0] <= first <= last <= told[1]:
+            return False
+        self._tell(*((min(first, told[3]), max(last, told[4])) if told else (first, last)))
+        return True
 
     def given_over(self, first: float, last: float) -> Given:
         """What kernels are told of the model, with data for these times (s); raises ValueError as `cover` does."""
@@ -259,15 +261,20 @@ class Problem:
         return self.given_bundle
 
     def _tell(self, first: float, last: float) -> Given:
-        outside.check_span(self.functions, first, last)
         begin, end = outside.days(first, last)
         given = Given(
             parameters=self.given,
             manoeuvres=frozen(manoeuvres.packed(self.manoeuvres, self.model)),
             data=outside.block_of(self._recipes, begin, end),
         )
-        self.__dict__["_told"] = begin, end, given
+        self.__dict__["_told"] = begin, end, given, first, last
         return given
+
+    @property
+    def checksums(self) -> dict[str, str]:
+        """What the data of its functions from outside, and of its stations' places, are told apart by."""
+        places = {f"station {s.name}": s.place for s in self.stations if s.place is not None}
+        return {name: recipe.checksum for name, recipe in {**self.functions, **places}.items()}
 
     @cached_property
     def _recipes(self) -> tuple[outside.Recipe, ...]:

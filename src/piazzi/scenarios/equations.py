@@ -8,10 +8,13 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, get_args
 
 from piazzi.expressions import check
+from piazzi.expressions.outside import check_calls
 from piazzi.model import STEP, TIME, Model, Parameter, Role, Sensor
 from piazzi.model.definitions import name_of
+from piazzi.model.functions import AT, STATION
 from piazzi.problem.epochs import epoch_given
 from piazzi.problem.parts import Schedule
+from piazzi.scenarios.functions import read_functions
 from piazzi.scenarios.table import Table, joined, shown
 from piazzi.text import nearest
 from piazzi.units import ONE, Unit, Units, is_quantity
@@ -39,6 +42,7 @@ class Physics:
     components: dict[str, dict[str, Unit]] = field(default_factory=dict)
     numbers: dict[str, dict[str, Unit]] = field(default_factory=dict)
     definitions: dict[str, str] = field(default_factory=dict)
+    functions: dict[str, Any] = field(default_factory=dict)
     defaults: dict[str, dict[str, float]] = field(default_factory=dict)
     schedules: dict[str, Schedule | None] = field(default_factory=dict)
 
@@ -72,6 +76,7 @@ def read_physics(file: Table, units: Units, epoch: Epoch | None = None) -> Physi
         return out
     _memory(file.table("memory"), out)
     parameters = _parameters(file.table("parameters"), units, out)
+    out.functions = read_functions(file.table("functions"), epoch)
     out.definitions = _definitions(file.table("definitions"), {*out.units, TIME, *([STEP] if "step" in file else [])}, out)
     dynamics = _dynamics(file, out)
     sensors = [_sensor(name, table, units, out, epoch) for name, table in file.table("sensors").tables()]
@@ -93,6 +98,7 @@ def read_physics(file: Table, units: Units, epoch: Epoch | None = None) -> Physi
                     discrete,
                     out.memory,
                     out.definitions,
+                    out.functions,
                 )
             )
     return out
@@ -190,8 +196,8 @@ def _dynamics(file: Table, out: Physics) -> dict[str, str]:
         file.fault("dynamics", "is missing: give the rate of every state")
         return {}
     table = file.table(key)
-    allowed = {*out.units, *out.definitions, TIME, *([STEP] if key == "step" else [])}
-    equations = {state: equation(table, state, allowed) for state in out.states}
+    allowed = {*out.units, *_names(out.definitions), TIME, *([STEP] if key == "step" else [])}
+    equations = {state: equation(table, state, allowed, outside=out.functions) for state in out.states}
     for state in out.states:
         if state not in table:
             table.fault("", f"has no equation for state {state!r}")
@@ -200,16 +206,52 @@ def _dynamics(file: Table, out: Physics) -> dict[str, str]:
     return equations
 
 
-def _definitions(table: Table, known: Collection[str], out: Physics, hint: str = "") -> dict[str, str]:
-    """Named values of equations, which may use one another."""
-    for name in table.data:
-        if name in out.units:
-            table.fault(name, "is also a state or a parameter: every name has one meaning")
-    allowed = {*known, *table.data}
-    return {name: equation(table, name, allowed, hint) for name in table.data}
+def _names(definitions: Collection[str]) -> list[str]:
+    """Every name that definitions give: a key may have several, with commas."""
+    return [name.strip() for key in definitions for name in key.split(",")]
 
 
-def equation(table: Table, key: str, allowed: Collection[str], hint: str = "") -> str:
+def _definitions(
+    table: Table, known: Collection[str], out: Physics, hint: str = "", outside: Collection[str] | None = None
+) -> dict[str, str]:
+    """Named values of equations, which may use one another; one key names all values of a function."""
+    for key in table.data:
+        for name in _names([key]):
+            if name in out.units:
+                table.fault(key, "is also a state or a parameter: every name has one meaning")
+    allowed = {*known, *_names(table.data)}
+    return {key: equation(table, key, allowed, hint, out.functions if outside is None else outside) for key in table.data}
+
+
+def _roots(table: Table, known: Collection[str], out: Physics, outside: Collection[str]) -> dict[str, Any]:
+    """Values given by equations that they solve, as `Sensor` takes them."""
+    found: dict[str, Any] = {}
+    for name, inner in table.tables():
+        allowed = {*known, *_provided({name: inner.data})}
+        read = {"root": equation(inner, "root", allowed, OWN, outside), "start": inner.raw("start")}
+        if "root" not in inner:
+            inner.fault("root", "is missing: an expression that is zero at the solution")
+        read["start"] = equation(inner, "start", known, OWN, outside) if "start" in inner else "0"
+        if "iterations" in inner:
+            read["iterations"] = inner.raw("iterations")
+        read["definitions"] = _definitions(inner.table("definitions"), allowed, out, OWN, outside)
+        read["roots"] = _roots(inner.table("roots"), allowed, out, outside)
+        inner.finish()
+        found[name] = read
+    return found
+
+
+def _provided(roots: Mapping[str, Any]) -> list[str]:
+    """Names that roots give: their own, and those of their definitions."""
+    names = list(roots)
+    for root in roots.values():
+        for key, give in (("definitions", _names), ("roots", _provided)):
+            inner = root.get(key) if isinstance(root, Mapping) else None
+            names += give(inner) if isinstance(inner, Mapping) else []
+    return names
+
+
+def equation(table: Table, key: str, allowed: Collection[str], hint: str = "", outside: Collection[str] = ()) -> str:
     """The text of an equation in which only these names occur; `hint` says what else an unknown one could be."""
     value = table.raw(key)
     if value is None:
@@ -219,7 +261,7 @@ def equation(table: Table, key: str, allowed: Collection[str], hint: str = "") -
         table.fault(key, f"must be an equation in quotes, not {shown(value)}")
         return "0"
     try:
-        check(text, allowed)
+        check_calls(text, allowed, outside)
     except ValueError as error:
         table.fault(key, f"{error}{hint if 'unknown name' in str(error) else ''}")
     return text
@@ -231,25 +273,29 @@ def _sensor(name: str, table: Table, units: Units, out: Physics, epoch: Epoch | 
     out.schedules[name] = read_schedule(table, units, epoch)
     for clash in numbers.keys() & out.units.keys():
         table.fault("numbers", f"names {clash!r}, which is also a state or a parameter")
-    known = {*out.units, *out.definitions, *numbers, TIME}
-    definitions = _definitions(table.table("definitions"), known, out, OWN)
-    for clash in definitions.keys() & (numbers.keys() | out.definitions.keys()):
+    outside = {*out.functions, AT, STATION}
+    known = {*out.units, *_names(out.definitions), *numbers, TIME}
+    solved = table.table("roots")
+    known |= {*_provided(solved.data)}
+    definitions = _definitions(table.table("definitions"), known, out, OWN, outside)
+    roots = _roots(solved, {*known, *_names(definitions)}, out, outside)
+    for clash in {*_names(definitions)} & (numbers.keys() | {*_names(out.definitions)}):
         table.fault("definitions", f"names {clash!r}, which has a meaning already")
     components = table.table("components")
     if not components.data:
         table.fault("components", "is missing: a sensor needs at least one equation")
     equations, angles, kinds = {}, [], {}
     for key in components.data:
-        equations[key], kinds[key], angle = _component(components, key, {*known, *definitions}, units)
+        equations[key], kinds[key], angle = _component(components, key, {*known, *_names(definitions)}, units, outside)
         angles += [key] if angle else []
-    visible = _rules(table, {*known, *definitions})
+    visible = _rules(table, {*known, *_names(definitions)})
     table.finish()
     out.components[name], out.numbers[name] = kinds, numbers
     with table.faults.at(table.path):
         labels = {k: u.label for k, u in kinds.items() if u.label}
-        used = Sensor(name, equations, tuple(angles), labels, {}, definitions, visible).free_names
+        used = Sensor(name, equations, tuple(angles), labels, {}, definitions, visible, roots).free_names
         own = {k: u.label for k, u in numbers.items() if u.label and k in used}
-        sensor = Sensor(name, equations, tuple(angles), labels, own, definitions, visible)
+        sensor = Sensor(name, equations, tuple(angles), labels, own, definitions, visible, roots)
         for unused in sorted(numbers.keys() - sensor.free_names):
             table.fault("numbers", f"names {unused!r}, which no equation uses{nearest(unused, sorted(sensor.free_names))}")
         return sensor
@@ -327,10 +373,12 @@ def _time(table: Table, key: str, units: Units, epoch: Epoch | None) -> float | 
     return None
 
 
-def _component(table: Table, key: str, allowed: Collection[str], units: Units) -> tuple[str, Unit, bool]:
+def _component(
+    table: Table, key: str, allowed: Collection[str], units: Units, outside: Collection[str]
+) -> tuple[str, Unit, bool]:
     """Equation and unit of a component, and whether it is an angle, which wraps."""
     if not isinstance(table.raw(key), Mapping):
-        text = equation(table, key, allowed, OWN)
+        text = equation(table, key, allowed, OWN, outside)
         if units.declared:
             table.fault(key, f"has no unit, but the file is not in SI: write {{ equation = ..., unit = {_example(units)} }}")
         if "atan2" in text:
@@ -339,7 +387,7 @@ def _component(table: Table, key: str, allowed: Collection[str], units: Units) -
     inner = table.table(key)
     if "equation" not in inner:
         inner.fault("equation", "is missing")
-    text = equation(inner, "equation", allowed, OWN)
+    text = equation(inner, "equation", allowed, OWN, outside)
     unit = unit_of(inner, "unit", units)
     angle = inner.flag("angle", unit.is_angle)
     if "atan2" in text and "unit" not in inner and "angle" not in inner:

@@ -38,9 +38,9 @@ MAX_BYTES = 2**18
 _LONG_KEY = re.compile(rb"(?:[\w\"'-]{1,200}[ \t]{0,20}\.[ \t]{0,20}){30}")
 _PLACE = re.compile(r" \(at (line \d+, column \d+|end of document)\)$")
 SECTIONS = (
-    "title", "epoch", "units", "states", "memory", "groups", "definitions", "dynamics", "step", "parameters", "sensors",
-    "stations", "prior", "process_noise", "gauss_markov", "integrator", "manoeuvres", "times", "truth", "picture", "study",
-    "recording",
+    "title", "epoch", "units", "states", "memory", "groups", "functions", "definitions", "dynamics", "step", "parameters",
+    "sensors", "stations", "prior", "process_noise", "gauss_markov", "integrator", "manoeuvres", "times", "truth", "picture",
+    "study", "recording",
 )  # fmt: skip
 MAX_STEPS = 10**10
 MAX_ROWS = 2 * 10**7
@@ -121,6 +121,7 @@ def _read(path: Path) -> tuple[Scenario | None, list[Fault]]:
         hint = nearest(path.name[:60], names())
         raise ValueError(f"there is no file or scenario {shown(os.fspath(path))}{hint}")
     faults = Faults()
+    faults.folder = path.parent
     data = _tables(path, faults)
     scenario = read_scenario(data, path.stem, faults) if not faults else None
     return scenario, list(faults)
@@ -194,7 +195,7 @@ def read_problem(file: Table, name: str, units: Units, start: float | None = Non
     with file.faults.at(""):
         places = [s for s in stations if s is not None]
         given = (physics.model, prior, noise, places, parameters, integrator, prior_time, truth, name, manoeuvres)
-        problem = Problem(*given, epoch=epoch)
+        problem = Problem(*given, functions=physics.functions, epoch=epoch)
         with file.faults.at("gauss_markov"):
             return problem if gauss_markov is None else with_gauss_markov(problem, **gauss_markov)
     return None

@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import isfinite
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,7 +40,9 @@ class ScenarioError(ValueError):
 
 
 class Faults(list[Fault]):
-    """Faults found so far."""
+    """Faults found so far, in a file of this folder."""
+
+    folder = Path()
 
     def add(self, path: str, message: str) -> None:
         self.append(Fault(path, one_line(message)))

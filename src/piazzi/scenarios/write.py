@@ -8,20 +8,25 @@ from typing import Any
 import numpy as np
 
 from piazzi.model import Model, Parameter, Sensor
+from piazzi.model.definitions import Definition, Definitions
+from piazzi.model.functions import ROOT, STATION_TABLE
 from piazzi.problem import Gaussian, Problem, ProcessNoise, Schedule, Station, Truth
+from piazzi.scenarios.functions import write_function
 from piazzi.scenarios.loader import read_problem
 from piazzi.scenarios.motion import write_integrator, write_manoeuvre
 from piazzi.scenarios.table import Faults, ScenarioError, Table
 from piazzi.units import Labels
 
 SECTIONS = (
-    "states", "memory", "groups", "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise",
-    "integrator", "manoeuvres", "truth", "epoch",
+    "states", "memory", "groups", "functions", "dynamics", "step", "parameters", "sensors", "stations", "prior",
+    "process_noise", "integrator", "manoeuvres", "truth", "epoch",
 )  # fmt: skip
 
 
-def problem_to_tables(problem: Problem) -> dict[str, Any]:
+def problem_to_tables(problem: Problem, *, whole: bool = True) -> dict[str, Any]:
     """Plain tables, lists, numbers and text that `problem_from_tables` reads back to the same problem, bit for bit.
+
+    Not `whole`, data of functions from outside are told apart by checksums only, and cannot be read back.
 
     Raises
     ------
@@ -38,13 +43,16 @@ def problem_to_tables(problem: Problem) -> dict[str, Any]:
         "integrator": write_integrator(problem.integrator),
         "manoeuvres": [write_manoeuvre(m) for m in problem.manoeuvres],
     }
+    if problem.functions:
+        tables["functions"] = {name: write_function(f) for name, f in problem.functions.items()} if whole else problem.checksums
     if problem.epoch is not None:
         tables["epoch"] = problem.epoch.exact()
     if problem.prior_time is not None:
         tables["prior"]["time"] = float(problem.prior_time)
     if problem.truth is not None:
         tables["truth"] = _truth(problem.truth)
-    problem_from_tables(tables, problem.name, "the problem cannot be written to a file")
+    if whole:
+        problem_from_tables(tables, problem.name, "the problem cannot be written to a file")
     return tables
 
 
@@ -72,12 +80,29 @@ def _equations(model: Model) -> dict[str, Any]:
 
 
 def _sensor(model: Model, sensor: Sensor) -> dict[str, Any]:
+    own = [name for name in model.numbers(sensor) if name != STATION_TABLE]
     rows = zip(sensor.components, sensor.equations, sensor.is_angle, dict(sensor.units).values(), strict=True)
     return {
         **({"visible": list(sensor.visible)} if sensor.visible else {}),
-        "numbers": dict.fromkeys(model.numbers(sensor), "") | dict(sensor.number_units),
-        "definitions": dict(sensor.definitions),
+        "numbers": dict.fromkeys(own, "") | dict(sensor.number_units),
+        "definitions": _values(sensor.definitions),
+        "roots": {d.names[0]: _root(d) for d in sensor.definitions if d.function == ROOT},
         "components": {c: {"equation": e, "unit": unit, "angle": angle} for c, e, angle, unit in rows},
+    }
+
+
+def _values(definitions: Definitions) -> dict[str, str]:
+    """Those that are no roots."""
+    return {", ".join(d.names): d.text for d in definitions if d.function != ROOT}
+
+
+def _root(d: Definition) -> dict[str, Any]:
+    return {
+        "root": d.texts[0],
+        "start": d.texts[1],
+        "iterations": d.iterations,
+        "definitions": _values(d.inner),
+        "roots": {own.names[0]: _root(own) for own in d.inner if own.function == ROOT},
     }
 
 

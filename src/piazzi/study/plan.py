@@ -168,7 +168,7 @@ class Plan:
             "estimators": {label: _described(e) for label, e in self.variants.items()},
             "vary": {axis.name: list(axis.values) for axis in self.axes},
             "times": hashlib.sha256(self.times.tobytes()).hexdigest(),
-            "problem": problem_to_tables(self.problem),
+            "problem": problem_to_tables(self.problem, whole=not self.problem.checksums),
         }
 
     @cached_property

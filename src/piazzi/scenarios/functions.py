@@ -1,0 +1,112 @@
+"""Functions from outside in a scenario: the kinds of the package and files of data beside the scenario, never code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from piazzi.model.definitions import name_of
+from piazzi.scenarios.table import Table, shown
+from piazzi.text import nearest
+
+if TYPE_CHECKING:
+    from piazzi.earth import Epoch
+
+    Reader = Callable[[Table, "Epoch | None"], Any]
+
+
+def read_functions(table: Table, epoch: Epoch | None) -> dict[str, Any]:
+    """The functions of a scenario by name; faults are noted with their place."""
+    out = {}
+    for name, inner in table.tables():
+        with table.faults.at(table.at(name)):
+            name_of(name, "function")
+            kind = inner.text("kind")
+            if kind is None:
+                inner.fault("kind", f"is missing: one of {', '.join(KINDS)}")
+            elif kind not in KINDS:
+                inner.fault("kind", f"is {shown(kind)}, which is no kind of function{nearest(kind[:60], KINDS)}")
+            else:
+                out[name] = KINDS[kind](inner, epoch)
+                inner.finish()
+    return {name: function for name, function in out.items() if function is not None}
+
+
+def write_function(function: Any) -> dict[str, Any]:
+    """The table that `read_functions` reads back; raises ValueError for a function that files cannot hold."""
+    from piazzi.earth.gravity import Gravity
+    from piazzi.earth.tabulated import Body, Rotation
+    from piazzi.outside.table import Table as Samples
+
+    if isinstance(function, Gravity) and isinstance(function.model, str | Path):
+        out = {"kind": "gravity", "model": str(function.model), "degree": function.degree}
+        return out | {"gradient_degree": function.gradient_degree, "on": function.on}
+    if isinstance(function, Samples):
+        out = {"kind": "table", "times": function.times.tolist(), "values": function.values.tolist(), "terms": function.terms}
+        return out if function.error is None else out | {"error": function.error}
+    if isinstance(function, Rotation) and function.eop is None:
+        return {"kind": "rotation", "from": function.from_, "to": function.to}
+    if isinstance(function, Body):
+        out = {"kind": "body", "body": function.name, "center": function.center}
+        return out if function.kernel is None else out | {"kernel": str(function.kernel)}
+    raise ValueError(f"function {type(function).__name__} cannot be written to a file: it is known in Python only")
+
+
+def _path(table: Table, text: str) -> Path:
+    """A file beside the scenario."""
+    return table.faults.folder / text
+
+
+def _gravity(table: Table, epoch: Epoch | None) -> Any:
+    from piazzi.earth.gravity import Gravity
+
+    model = table.text("model", "EGM2008") or "EGM2008"
+    is_file = "." in model or "/" in model
+    given = {key: table.raw(key) for key in ("degree", "gradient_degree", "on") if key in table}
+    return Gravity(_path(table, model) if is_file else model, **given)
+
+
+def _samples(table: Table, epoch: Epoch | None) -> Any:
+    from piazzi.outside.table import Table as Samples
+
+    options = {key: table.raw(key) for key in ("error", "terms") if key in table}
+    file = table.text("file")
+    if file is not None:
+        return Samples.read(_path(table, file), **options)
+    if "times" not in table or "values" not in table:
+        table.fault("", "has no samples: give file = a CSV, or times and values")
+        return None
+    return Samples(table.raw("times"), table.raw("values"), **options)
+
+
+def _rotation(table: Table, epoch: Epoch | None) -> Any:
+    from piazzi.earth.tabulated import Rotation
+
+    given, wanted = table.text("from"), table.text("to")
+    for key, frame in (("from", given), ("to", wanted)):
+        if frame is None:
+            table.fault(key, "is missing: the name of a frame, such as 'GCRF' or 'ITRF'")
+    if given is None or wanted is None or epoch is None:
+        return _undated(table, epoch)
+    return Rotation(given, wanted, epoch)
+
+
+def _body(table: Table, epoch: Epoch | None) -> Any:
+    from piazzi.earth.tabulated import Body
+
+    name = table.text("body")
+    if name is None:
+        table.fault("body", "is missing: the name of a body, such as 'sun'")
+    kernel, center = table.text("kernel"), table.text("center", "earth")
+    if name is None or center is None or epoch is None:
+        return _undated(table, epoch)
+    return Body(name, epoch, None if kernel is None else _path(table, kernel), center)
+
+
+def _undated(table: Table, epoch: Epoch | None) -> None:
+    if epoch is None:
+        table.fault("kind", "needs dates: give the scenario an epoch, such as epoch = '2016-02-13T16:00:00 UTC'")
+
+
+KINDS: Mapping[str, Reader] = {"gravity": _gravity, "table": _samples, "rotation": _rotation, "body": _body}

@@ -1,0 +1,190 @@
+"""Functions from outside and roots in scenarios: tables, files beside it, faults with their place, files that keep them."""
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi.io.files import save
+from piazzi.outside.table import Table
+from piazzi.scenarios.loader import load_scenario
+from piazzi.scenarios.table import ScenarioError
+
+TEXT = """title = "A pushed oscillator, seen with a delay"
+[states]
+x = "m"
+vx = "m/s"
+[functions]
+push = { kind = "table", file = "push.csv" }
+[definitions]
+a = "push(t)"
+[dynamics]
+x = "vx"
+vx = "a - x + 0.5*push(t + 1)"
+[sensors.radar.components]
+rho = "x + tau"
+[sensors.radar.roots.tau]
+root = "d/10 - tau"
+[sensors.radar.roots.tau.definitions]
+r = "at(-tau)"
+d = "sqrt((r - 3)**2 + 1)"
+[[stations]]
+name = "a"
+sensor = "radar"
+noise = { sigma = 0.001 }
+[prior]
+mean = [1, 0]
+sigma = [0.1, 0.1]
+[process_noise]
+variance = [0, 1e-8]
+per = "second"
+[times]
+start = 0
+stop = 5
+step = 0.1
+"""
+
+
+def push(t):
+    return np.sin(0.3 * t)
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    times = np.arange(-2.0, 12.0, 0.25)
+    rows = "".join(f"{t!r},{float(push(t))!r}\n" for t in times.tolist())
+    (tmp_path / "push.csv").write_text("t,a\n" + rows)
+
+    def make(text=TEXT):
+        (tmp_path / "s.toml").write_text(text)
+        return tmp_path / "s.toml"
+
+    return make
+
+
+def test_a_table_beside_the_scenario_is_a_function_of_it(scenario):
+    problem = load_scenario(scenario()).problem
+    for t in (0.3, 4.71):
+        want = [0.2, push(t) - 1.0 + 0.5 * push(t + 1)]
+        np.testing.assert_allclose(problem.dynamics([1.0, 0.2], t), want, atol=1e-7)
+    tau = problem.measure("a", [1.0, 0.2], 1.0)[0] - 1.0
+    before = problem.step([1.0, 0.2], -tau, 1.0)[0][0]
+    np.testing.assert_allclose(np.hypot(before - 3, 1) / 10, tau, rtol=1e-9)
+
+
+def test_estimators_compare_on_it(scenario):
+    problem = load_scenario(scenario()).problem
+    tracking = pz.simulate(problem, np.arange(0.0, 5.0, 0.1), np.random.default_rng(2))
+    graph = pz.FactorGraph().estimate(problem, tracking)
+    smoother = pz.Smoother().estimate(problem, tracking)
+    assert graph.success and smoother.success
+    sigma = np.sqrt(np.diagonal(graph.covariance, axis1=1, axis2=2))
+    assert np.abs((graph.mean - tracking.truth) / sigma).max() < 5
+    np.testing.assert_allclose(graph.mean[-1], smoother.mean[-1], atol=0.05 * sigma[-1].max())
+
+
+def test_a_recording_keeps_functions_and_roots(scenario, tmp_path):
+    problem = load_scenario(scenario()).problem
+    tracking = pz.simulate(problem, np.arange(0.0, 2.0, 0.1), np.random.default_rng(2))
+    save(tmp_path / "r.nc", problem, tracking)
+    loaded, _ = pz.load(tmp_path / "r.nc")
+    assert loaded.model == problem.model
+    assert loaded.functions["push"].checksum == problem.functions["push"].checksum
+    np.testing.assert_array_equal(loaded.dynamics([1.0, 0.2], 0.7), problem.dynamics([1.0, 0.2], 0.7))
+
+
+def test_a_session_goes_on_where_the_data_were_not_yet_wanted(scenario):
+    times = np.arange(-90000.0, 300000.0, 3600.0)
+    table = Table(times, np.sin(times / 30000.0))
+    model = pz.Model(["x"], ["1e-4*push(t) - 1e-5*x"], [pz.Sensor("s", ["x"])], functions={"push": table})
+    problem = pz.Problem(model, pz.Gaussian([0.0], 1.0), [1e-9], pz.Station("s", "s", 1e-2), functions={"push": table})
+    tracking = pz.simulate(problem, np.arange(0.0, 250000.0, 5000.0), np.random.default_rng(1))
+    whole = pz.ExtendedKalmanFilter().estimate(problem, tracking)
+    other = pz.Problem(model, pz.Gaussian([0.0], 1.0), [1e-9], pz.Station("s", "s", 1e-2), functions={"push": table})
+    live = pz.ExtendedKalmanFilter().start(other)
+    for k, t in enumerate(tracking.times):
+        live.update("s", tracking.values[k, 0], t)
+        np.testing.assert_array_equal(live.mean, whole.mean[k])
+    with pytest.raises(ValueError, match=r"'push' has values from t = -90000 to 2988"):
+        live.predict(400000.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('kind = "table"', 'kind = "tabel"', r"functions\.push\.kind.*no kind of function.*table"),
+        ('kind = "table", ', "", r"functions\.push\.kind.*is missing"),
+        ('file = "push.csv"', 'file = "nothing.csv"', "nothing.csv"),
+        ('file = "push.csv"', 'file = "push.csv", code = "x.py"', r"functions\.push\.code.*unknown key"),
+        ('file = "push.csv"', "times = [0, 1]", "has no samples"),
+        ("push(t)", "push(t, x)", r"push takes 1 argument, got 2"),
+        ("push(t)", "pusj(t)", r"'pusj' is not a function; did you mean 'push'"),
+        ("push(t)", "push(z)", r"definitions\.a.*unknown name 'z'"),
+        ("d/10 - tau", "d/10 - tua", r"roots\.tau\.root.*unknown name 'tua'"),
+        ('root = "d/10 - tau"', 'iterations = 3', r"roots\.tau\.root.*is missing"),
+        ("at(-tau)", "at(-tau, order=3)", r"write at\(offset\), or at\(offset, order=2\)"),
+        ("start = 0\n", "start = 11\n", "'push' has values|t \\+ 1"),
+    ],
+)  # fmt: skip
+def test_faults_have_their_place(scenario, old, new, message):
+    assert old in TEXT
+    with pytest.raises((ScenarioError, ValueError, OSError), match=message):
+        found = load_scenario(scenario(TEXT.replace(old, new, 1).replace("stop = 5", "stop = 15")))
+        pz.simulate(found.problem, np.arange(11.0, 15.0), np.random.default_rng(1))
+
+
+EARTH = """epoch = "2016-02-13T16:00:00 UTC"
+[states]
+x = "m"
+y = "m"
+z = "m"
+vx = "m/s"
+vy = "m/s"
+vz = "m/s"
+[functions]
+field = { kind = "gravity", model = "EGM2008", degree = 8 }
+fixed = { kind = "rotation", from = "GCRF", to = "ITRF" }
+free = { kind = "rotation", from = "ITRF", to = "GCRF" }
+sun = { kind = "body", body = "sun" }
+[definitions]
+"bx, by, bz" = "fixed(t, x, y, z)"
+"gx, gy, gz" = "field(bx, by, bz)"
+"ax, ay, az" = "free(t, gx, gy, gz)"
+"sx, sy, sz" = "sun(t)"
+[dynamics]
+x = "vx"
+y = "vy"
+z = "vz"
+vx = "ax + 1e-30*sx"
+vy = "ay + 1e-30*sy"
+vz = "az + 1e-30*sz"
+[sensors.fix.components]
+x_seen = "x"
+[[stations]]
+name = "a"
+sensor = "fix"
+noise = { sigma = 1.0 }
+[prior]
+mean = [7e6, 0, 0, 0, 5.3e3, 5.3e3]
+sigma = [10, 10, 10, 0.1, 0.1, 0.1]
+[times]
+start = 0
+stop = 600
+step = 60
+"""
+
+
+def test_the_earth_of_a_scenario_is_that_of_python(scenario, tmp_path):
+    problem = load_scenario(scenario(EARTH)).problem
+    x, t = problem.prior.mean, 431.0
+    W = pz.earth.rotation("GCRF", "ITRF", problem.epoch + t)
+    want = W.T @ np.array(problem.functions["field"].value(*(W @ x[:3])))
+    np.testing.assert_allclose(problem.dynamics(x, t)[3:], want, rtol=1e-10, atol=1e-12)
+    tracking = pz.simulate(problem, np.arange(0.0, 300.0, 60.0), np.random.default_rng(2))
+    save(tmp_path / "r.nc", problem, tracking)
+    loaded, _ = pz.load(tmp_path / "r.nc")
+    np.testing.assert_array_equal(loaded.dynamics(x, t), problem.dynamics(x, t))
+
+
+def test_the_earth_needs_dates(scenario):
+    with pytest.raises(ScenarioError, match="needs dates: give the scenario an epoch"):
+        load_scenario(scenario(EARTH.replace('epoch = "2016-02-13T16:00:00 UTC"\n', "")))
