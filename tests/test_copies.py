@@ -96,7 +96,7 @@ def samples():
     ]
     parts = [problem.model, problem.prior, problem.process_noise, problem.stations[0], problem.model.sensors[0]]
     others = [pz.Manoeuvre(1.0, [1.0, 0.0], 0.1), pz.Parameter("mu"), pz.Truth([1.0, 0.0]), pz.Epoch("2020-01-01 UTC")]
-    others += [observations(), pz.Ephemeris(arcs=(arc(),))]
+    others += [observations(), pz.Ephemeris(arcs=(arc(),)), pz.Table([0.0, 1.0, 2.0], [0.0, 1.0, 0.5])]
     results = [estimate, estimate.predict([9.0]), pz.compare(problem, tracking, {"ekf": settings[1]}), prediction]
     results += [pz.observability(problem, tracking), pz.windows(problem, tracking, [2, 3])]
     results += [pz.update(problem, prediction, "east", [3.0]), pz.Study.of("b612-range", runs=2)]

@@ -114,9 +114,9 @@ def test_reading_a_scenario_parses_each_equation_once():
 from collections import Counter
 from piazzi.expressions import parse
 count, init = Counter(), parse._Reader.__init__
-def counted(self, text):
+def counted(self, text, *outside):
     count[text] += 1
-    init(self, text)
+    init(self, text, *outside)
 parse._Reader.__init__ = counted
 import piazzi as pz
 pz.load("b612-range")

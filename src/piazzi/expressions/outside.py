@@ -7,7 +7,8 @@ from collections.abc import Callable, Collection
 
 from piazzi.expressions import check, names
 from piazzi.expressions.functions import TABLE
-from piazzi.expressions.language import Call, Name, Negative, Node, Number, Power, Product, Sum, fold
+from piazzi.expressions.language import Call, ExpressionError, Name, Negative, Node, Number, Power, Product, Sum, fold
+from piazzi.expressions.limits import read
 from piazzi.expressions.parse import parse
 
 _ORDER = re.compile(r",\s*order\s*=\s*(\d+)\s*\)")  # at(offset, order=2): the one argument that is written with its name
@@ -27,7 +28,7 @@ def split(text: str, outside: Collection[str] | None, stand_in: Callable[[str, t
         For text outside the language.
     """
     text = _ORDER.sub(r", \1)", text)
-    tree, calls = parse(text, outside).tree, 0
+    tree, calls = _tree(text, outside), 0
 
     def combine(node: Node, parts: list[str]) -> str:
         nonlocal calls
@@ -42,8 +43,18 @@ def split(text: str, outside: Collection[str] | None, stand_in: Callable[[str, t
 
 def whole_call(text: str, outside: Collection[str] | None) -> bool:
     """Whether an equation is nothing but one call of a function from outside."""
-    tree = parse(_ORDER.sub(r", \1)", text), outside).tree
+    tree = _tree(_ORDER.sub(r", \1)", text), outside)
     return isinstance(tree, Call) and tree.function not in TABLE
+
+
+def _tree(text: str, outside: Collection[str] | None) -> Node:
+    """The tree of an equation; that of one which is all of the language is shared with its other readers."""
+    try:
+        return read(text).tree
+    except ExpressionError:
+        if outside is not None and not outside:
+            raise
+        return parse(text, outside).tree
 
 
 def _bare(text: str) -> str:

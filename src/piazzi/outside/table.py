@@ -72,6 +72,15 @@ class Table:
                     f"those left out are foretold to about {self.sample_error[column]:.2g}"
                 )
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What it was made of: the polynomials are made again where they are wanted."""
+        return {name: getattr(self, name) for name in ("times", "values", "error", "terms")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        for name in ("times", "values"):
+            state[name].flags.writeable = False
+
     @classmethod
     def read(cls, path: str | Path, error: Any = None, terms: int = TERMS) -> Table:
         """The table of a CSV file: times in the first column, values in the others; raises ValueError with the line."""
