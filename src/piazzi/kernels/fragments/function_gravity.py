@@ -16,41 +16,47 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def next_degree(a, b, uq, q, q2, first, A, B, dA, dB):
+def next_degree(a, b, uq, q, q2, first, before):
     """A_nm and its derivative, from those of the two degrees before."""
+    A, B, dA, dB = before
     au, bq = a * uq, b * q2
     return fused(au, A, fused(bq, B, first)), fused(au, dA, fused(bq, dB, (a * q) * A))
 
 
 @inline
-def add_degree(C, S, n1, Z, dZ, L, K, Lu, Ku, Lr, Kr):
+def add_degree(C, S, n1, Z, dZ, sums):
     """Sums over degrees of C and S times A, dA/du and -r d/dr of them."""
+    L, K, Lu, Ku, Lr, Kr = sums
     rZ = n1 * Z
     return fused(C, Z, L), fused(S, Z, K), fused(C, dZ, Lu), fused(S, dZ, Ku), fused(C, rZ, Lr), fused(S, rZ, Kr)
 
 
 @inline
-def add_orders(c, d, c1, d1, L, K, Lu, Ku, Lr, Kr, gs, gt, gu, gr):
+def add_orders(c, d, c1, d1, sums, slopes):
     """Sums over orders of the derivatives of U by s, t, u, r; c1 + i d1 is m w^(m-1)."""
+    (L, K, Lu, Ku, Lr, Kr), (gs, gt, gu, gr) = sums, slopes
     gs = gs + fused(L, c1, K * d1)
     gt = gt + fused(K, c1, -(L * d1))
     return gs, gt, gu + fused(Lu, c, Ku * d), gr + fused(Lr, c, Kr * d)
 
 
 @inline
-def acceleration(s, t, u, f, q, gs, gt, gu, gr):
+def acceleration(s, t, u, f, q, slopes):
     """The acceleration: along (s, t, u) what is left of d/dr, and the derivatives by s, t, u."""
+    gs, gt, gu, gr = slopes
     ds, dt, du = f * q * gs, f * q * gt, f * gu
     along = -(f * gr) - (s * ds + t * dt + u * du)
     return ds + along * s, dt + along * t, du + along * u, along
 
 
 @inline
-def acceleration_and_gradient(s, t, u, q, ir, GM, gs, gt, gu, gr, hss, hst, hsu, htu, huu, hrs, hrt, hru, es, et, eu, er):
-    """The acceleration, with e.. of the degrees beyond the gradient's; the gradient, whose last sum is Laplace's equation's."""
+def acceleration_and_gradient(towards, q, ir, GM, slopes, curvatures, beyond):
+    """The acceleration, with slopes of degrees beyond the gradient's; the gradient, whose last sum is Laplace's equation's."""
+    (s, t, u), (gs, gt, gu, gr), (es, et, eu, er) = towards, slopes, beyond
+    hss, hst, hsu, htu, huu, hrs, hrt, hru = curvatures
     f = GM * ir * ir
-    ax, ay, az, _ = acceleration(s, t, u, f, q, gs + es, gt + et, gu + eu, gr + er)
-    _, _, _, along = acceleration(s, t, u, f, q, gs, gt, gu, gr)
+    ax, ay, az, _ = acceleration(s, t, u, f, q, (gs + es, gt + et, gu + eu, gr + er))
+    _, _, _, along = acceleration(s, t, u, f, q, slopes)
     e, a = f * ir, along * ir
     e1, e2 = e * q, e * q * q
     ss, st, su, tu, uu = e2 * hss, e2 * hst, e1 * hsu, e1 * htu, e * huu
@@ -104,17 +110,17 @@ def gravity_of_one(x, y, z, data, at):
             if n < 8 * block + 8:
                 first = load_eights(data, seed, 1)[0]
                 seed += 8
-            Z, dZ = next_degree(given[0], given[1], uq, q, q2, first, A, B, dA, dB)
+            Z, dZ = next_degree(given[0], given[1], uq, q, q2, first, (A, B, dA, dB))
             A, B, dA, dB = Z, A, dZ, dA
-            L, K, Lu, Ku, Lr, Kr = add_degree(given[2], given[3], n + 1.0, Z, dZ, L, K, Lu, Ku, Lr, Kr)
+            L, K, Lu, Ku, Lr, Kr = add_degree(given[2], given[3], n + 1.0, Z, dZ, (L, K, Lu, Ku, Lr, Kr))
         c1, d1 = m * load_eights(re, 7, 1)[0], m * load_eights(im, 7, 1)[0]
-        gs, gt, gu, gr = add_orders(c, d, c1, d1, L, K, Lu, Ku, Lr, Kr, gs, gt, gu, gr)
+        gs, gt, gu, gr = add_orders(c, d, c1, d1, (L, K, Lu, Ku, Lr, Kr), (gs, gt, gu, gr))
         store_eight(re, 0, c)
         store_eight(im, 0, d)
         c, d = c * a8 - d * b8, c * b8 + d * a8
         m = m + 8.0
     g = sums_of_eight(vector(gs, gt, gu, gr, zero, zero, zero, zero))
-    ax, ay, az, _ = acceleration(s, t, u, data[at + 3] * ir * ir, q, g[0], g[1], g[2], g[3])
+    ax, ay, az, _ = acceleration(s, t, u, data[at + 3] * ir * ir, q, (g[0], g[1], g[2], g[3]))
     return ax, ay, az
 
 
@@ -151,16 +157,16 @@ def gravity_partials_of_one(x, y, z, data, at):
                 first = load_eights(data, seed, 1)[0]
                 seed += 8
             a, C, S, n1 = given[0], given[2], given[3], n + 1.0
-            Z, dZ = next_degree(a, given[1], uq, q, q2, first, A, B, dA, dB)
+            Z, dZ = next_degree(a, given[1], uq, q, q2, first, (A, B, dA, dB))
             eZ = fused(a * uq, eA, fused(given[1] * q2, eB, (a * q + a * q) * dA))
             A, B, dA, dB, eA, eB = Z, A, dZ, dA, eZ, eA
             rdZ = n1 * dZ
-            L, K, Lu, Ku, Lr, Kr = add_degree(C, S, n1, Z, dZ, L, K, Lu, Ku, Lr, Kr)
+            L, K, Lu, Ku, Lr, Kr = add_degree(C, S, n1, Z, dZ, (L, K, Lu, Ku, Lr, Kr))
             Luu, Kuu, Lru, Kru = fused(C, eZ, Luu), fused(S, eZ, Kuu), fused(C, rdZ, Lru), fused(S, rdZ, Kru)
         c1, d1 = m * load_eights(re, 7, 1)[0], m * load_eights(im, 7, 1)[0]
         mm = m * (m - 1.0)
         c2, d2 = mm * load_eights(re, 6, 1)[0], mm * load_eights(im, 6, 1)[0]
-        gs, gt, gu, gr = add_orders(c, d, c1, d1, L, K, Lu, Ku, Lr, Kr, gs, gt, gu, gr)
+        gs, gt, gu, gr = add_orders(c, d, c1, d1, (L, K, Lu, Ku, Lr, Kr), (gs, gt, gu, gr))
         hss, hst = hss + fused(L, c2, K * d2), hst + fused(K, c2, -(L * d2))
         hsu, htu, huu = hsu + fused(Lu, c1, Ku * d1), htu + fused(Ku, c1, -(Lu * d1)), huu + fused(Luu, c, Kuu * d)
         hrs, hrt, hru = hrs + fused(Lr, c1, Kr * d1), hrt + fused(Kr, c1, -(Lr * d1)), hru + fused(Lru, c, Kru * d)
@@ -173,10 +179,10 @@ def gravity_partials_of_one(x, y, z, data, at):
                 if n < 8 * block + 8:
                     first = load_eights(data, seed, 1)[0]
                     seed += 8
-                Z, dZ = next_degree(given[0], given[1], uq, q, q2, first, A, B, dA, dB)
+                Z, dZ = next_degree(given[0], given[1], uq, q, q2, first, (A, B, dA, dB))
                 A, B, dA, dB = Z, A, dZ, dA
-                L, K, Lu, Ku, Lr, Kr = add_degree(given[2], given[3], n + 1.0, Z, dZ, L, K, Lu, Ku, Lr, Kr)
-            es, et, eu, er = add_orders(c, d, c1, d1, L, K, Lu, Ku, Lr, Kr, es, et, eu, er)
+                L, K, Lu, Ku, Lr, Kr = add_degree(given[2], given[3], n + 1.0, Z, dZ, (L, K, Lu, Ku, Lr, Kr))
+            es, et, eu, er = add_orders(c, d, c1, d1, (L, K, Lu, Ku, Lr, Kr), (es, et, eu, er))
         store_eight(re, 0, c)
         store_eight(im, 0, d)
         c, d = c * a8 - d * b8, c * b8 + d * a8
@@ -184,7 +190,7 @@ def gravity_partials_of_one(x, y, z, data, at):
     g = sums_of_eight(vector(gs, gt, gu, gr, hss, hst, hsu, htu))
     h = sums_of_eight(vector(huu, hrs, hrt, hru, es, et, eu, er))
     first_sums, second_sums = (g[0], g[1], g[2], g[3]), (g[4], g[5], g[6], g[7], h[0], h[1], h[2], h[3])
-    return acceleration_and_gradient(s, t, u, q, ir, data[at + 3], *first_sums, *second_sums, h[4], h[5], h[6], h[7])
+    return acceleration_and_gradient((s, t, u), q, ir, data[at + 3], first_sums, second_sums, (h[4], h[5], h[6], h[7]))
 
 
 @outlined
@@ -208,14 +214,14 @@ def gravity_of_several(x, y, z, data, at):
         A, B, dA, dB = zero, zero, zero, zero
         L, K, Lu, Ku, Lr, Kr = zero, zero, zero, zero, zero, zero
         for n in range(m, N + 1):
-            Z, dZ = next_degree(data[row], data[row + 8], uq, q, q2, first, A, B, dA, dB)
+            Z, dZ = next_degree(data[row], data[row + 8], uq, q, q2, first, (A, B, dA, dB))
             A, B, dA, dB, first = Z, A, dZ, dA, zero
-            L, K, Lu, Ku, Lr, Kr = add_degree(data[row + 16], data[row + 24], n + 1.0, Z, dZ, L, K, Lu, Ku, Lr, Kr)
+            L, K, Lu, Ku, Lr, Kr = add_degree(data[row + 16], data[row + 24], n + 1.0, Z, dZ, (L, K, Lu, Ku, Lr, Kr))
             row += 32
-        gs, gt, gu, gr = add_orders(c, d, float(m) * c1, float(m) * d1, L, K, Lu, Ku, Lr, Kr, gs, gt, gu, gr)
+        gs, gt, gu, gr = add_orders(c, d, float(m) * c1, float(m) * d1, (L, K, Lu, Ku, Lr, Kr), (gs, gt, gu, gr))
         c1, d1 = c, d
         c, d = c * sq - d * tq, c * tq + d * sq
-    ax, ay, az, _ = acceleration(s, t, u, data[at + 3] * ir * ir, q, gs, gt, gu, gr)
+    ax, ay, az, _ = acceleration(s, t, u, data[at + 3] * ir * ir, q, (gs, gt, gu, gr))
     return ax, ay, az
 
 
@@ -243,30 +249,30 @@ def gravity_partials_of_several(x, y, z, data, at):
         Luu, Kuu, Lru, Kru = zero, zero, zero, zero
         for n in range(m, G + 1):
             a, b, C, S, n1 = data[row], data[row + 8], data[row + 16], data[row + 24], n + 1.0
-            Z, dZ = next_degree(a, b, uq, q, q2, first, A, B, dA, dB)
+            Z, dZ = next_degree(a, b, uq, q, q2, first, (A, B, dA, dB))
             eZ = fused(a * uq, eA, fused(b * q2, eB, ((a + a) * q) * dA))
             A, B, dA, dB, eA, eB, first = Z, A, dZ, dA, eZ, eA, zero
             rdZ = n1 * dZ
-            L, K, Lu, Ku, Lr, Kr = add_degree(C, S, n1, Z, dZ, L, K, Lu, Ku, Lr, Kr)
+            L, K, Lu, Ku, Lr, Kr = add_degree(C, S, n1, Z, dZ, (L, K, Lu, Ku, Lr, Kr))
             Luu, Kuu, Lru, Kru = fused(C, eZ, Luu), fused(S, eZ, Kuu), fused(C, rdZ, Lru), fused(S, rdZ, Kru)
             row += 32
         mc, md, mc2, md2 = m1 * c1, m1 * d1, (m1 * (m1 - 1.0)) * c2, (m1 * (m1 - 1.0)) * d2
-        gs, gt, gu, gr = add_orders(c, d, mc, md, L, K, Lu, Ku, Lr, Kr, gs, gt, gu, gr)
+        gs, gt, gu, gr = add_orders(c, d, mc, md, (L, K, Lu, Ku, Lr, Kr), (gs, gt, gu, gr))
         hss, hst = hss + fused(L, mc2, K * md2), hst + fused(K, mc2, -(L * md2))
         hsu, htu, huu = hsu + fused(Lu, mc, Ku * md), htu + fused(Ku, mc, -(Lu * md)), huu + fused(Luu, c, Kuu * d)
         hrs, hrt, hru = hrs + fused(Lr, mc, Kr * md), hrt + fused(Kr, mc, -(Lr * md)), hru + fused(Lru, c, Kru * d)
         if G < N:
             L, K, Lu, Ku, Lr, Kr = zero, zero, zero, zero, zero, zero
             for n in range(max(m, G + 1), N + 1):
-                Z, dZ = next_degree(data[row], data[row + 8], uq, q, q2, first, A, B, dA, dB)
+                Z, dZ = next_degree(data[row], data[row + 8], uq, q, q2, first, (A, B, dA, dB))
                 A, B, dA, dB, first = Z, A, dZ, dA, zero
-                L, K, Lu, Ku, Lr, Kr = add_degree(data[row + 16], data[row + 24], n + 1.0, Z, dZ, L, K, Lu, Ku, Lr, Kr)
+                L, K, Lu, Ku, Lr, Kr = add_degree(data[row + 16], data[row + 24], n + 1.0, Z, dZ, (L, K, Lu, Ku, Lr, Kr))
                 row += 32
-            es, et, eu, er = add_orders(c, d, mc, md, L, K, Lu, Ku, Lr, Kr, es, et, eu, er)
+            es, et, eu, er = add_orders(c, d, mc, md, (L, K, Lu, Ku, Lr, Kr), (es, et, eu, er))
         c2, d2, c1, d1 = c1, d1, c, d
         c, d = c * sq - d * tq, c * tq + d * sq
     first_sums, second_sums = (gs, gt, gu, gr), (hss, hst, hsu, htu, huu, hrs, hrt, hru)
-    return acceleration_and_gradient(s, t, u, q, ir, data[at + 3], *first_sums, *second_sums, es, et, eu, er)
+    return acceleration_and_gradient((s, t, u), q, ir, data[at + 3], first_sums, second_sums, (es, et, eu, er))
 
 
 @inline

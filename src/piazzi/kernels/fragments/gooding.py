@@ -19,7 +19,7 @@ def gooding_miss(p, q, given, back, turns, late, mu):
     a0, a1, a2 = given[15] + rho * given[0], given[16] + rho * given[1], given[17] + rho * given[2]
     b0, b1, b2 = given[21] + far * given[6], given[22] + far * given[7], given[23] + far * given[8]
     v0, v1, v2, _, _, _ = lambert_velocities(
-        a0, a1, a2, b0, b1, b2, given[28], given[24], given[25], given[26], back, turns, late, mu
+        (a0, a1, a2), (b0, b1, b2), given[28], (given[24], given[25], given[26]), (back, turns, late), mu
     )
     distance = sqrt(a0 * a0 + a1 * a1 + a2 * a2)
     F, G, _, _ = kepler_motion(distance, a0 * v0 + a1 * v1 + a2 * v2, v0 * v0 + v1 * v1 + v2 * v2, mu, given[27])

@@ -28,13 +28,20 @@ def exact_minor(a, b, c, d):
     return (p - q) + (product_error(a, b, p) - product_error(c, d, q))
 
 
+@inline
+def three(a, at):
+    """Three numbers in a row."""
+    return a[at], a[at + 1], a[at + 2]
+
+
 @outlined
-def lambert_shape(a0, a1, a2, b0, b1, b2, n0, n1, n2, back):
+def lambert_shape(from_, to, about, back):
     """Distances, chord and half perimeter, lam, 1 - lam^2, sine of half the angle, and the normal of the motion.
 
-    The motion is about (n0, n1, n2), or against it where `back` is positive; that is its plane too, on a line through the
+    The motion is about `about`, or against it where `back` is positive; that is its plane too, on a line through the
     centre.
     """
+    (a0, a1, a2), (b0, b1, b2), (n0, n1, n2) = from_, to, about
     ra = sqrt(a0 * a0 + a1 * a1 + a2 * a2)
     rb = sqrt(b0 * b0 + b1 * b1 + b2 * b2)
     u0, u1, u2 = a0 / ra, a1 / ra, a2 / ra
@@ -63,9 +70,11 @@ def lambert_shape(a0, a1, a2, b0, b1, b2, n0, n1, n2, back):
 
 
 @outlined
-def lambert_velocities(a0, a1, a2, b0, b1, b2, dt, n0, n1, n2, back, turns, late, mu):
+def lambert_velocities(from_, to, dt, about, which, mu):
     """Velocities at both ends, six numbers; NaN where there is no such path."""
-    ra, rb, c, s, lam, short, half, m0, m1, m2 = lambert_shape(a0, a1, a2, b0, b1, b2, n0, n1, n2, back)
+    back, turns, late = which
+    (a0, a1, a2), (b0, b1, b2) = from_, to
+    ra, rb, c, s, lam, short, half, m0, m1, m2 = lambert_shape(from_, to, about, back)
     if not (c > 0.0 and dt > 0.0):
         return nan, nan, nan, nan, nan, nan
     x = lambert_x(lam, short, sqrt(2.0 * mu / s) / s * dt, turns, late)
@@ -103,10 +112,7 @@ def lambert(r1: Array, r2: Array, dt: Array, about: Array, which: Array, mu: flo
     """Velocities (count, 6); `which` (count, 3) says backwards, turns and late."""
     for k in range(count):
         i = 3 * k
-        v = lambert_velocities(
-            r1[i], r1[i + 1], r1[i + 2], r2[i], r2[i + 1], r2[i + 2], dt[k], about[0], about[1], about[2],
-            which[i], which[i + 1], which[i + 2], mu,
-        )  # fmt: skip
+        v = lambert_velocities(three(r1, i), three(r2, i), dt[k], three(about, 0), three(which, i), mu)
         for j in range(6):
             out[6 * k + j] = v[j]
 
@@ -116,9 +122,7 @@ def lambert_most(r1: Array, r2: Array, dt: Array, about: Array, back: float, mu:
     """How many turns there is time for, (count,)."""
     for k in range(count):
         i = 3 * k
-        _, _, _, s, lam, short, _, _, _, _ = lambert_shape(
-            r1[i], r1[i + 1], r1[i + 2], r2[i], r2[i + 1], r2[i + 2], about[0], about[1], about[2], back
-        )
+        _, _, _, s, lam, short, _, _, _, _ = lambert_shape(three(r1, i), three(r2, i), three(about, 0), back)
         T = sqrt(2.0 * mu / s) / s * dt[k]
         most = ceil(T / pi) - 1.0
         if most > 0.0:
