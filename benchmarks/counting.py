@@ -19,6 +19,7 @@ import piazzi as pz
 from piazzi import kernels
 from piazzi.kernels import plain
 from piazzi.kernels.entries import signatures
+from piazzi.kernels.members import Bundle
 
 
 class Number:
@@ -112,7 +113,8 @@ class _Entry:
     def __init__(self, function: Callable[..., None]) -> None:
         self._function = function
 
-    def __call__(self, *args: Any) -> None:
+    def __call__(self, *given: Any) -> None:
+        args = [member for a in given for member in (a.members if isinstance(a, Bundle) else (a,))]
         floats = [i for i, a in enumerate(args) if isinstance(a, np.ndarray) and a.dtype == np.float64]
         inside = [_objects(a).reshape(-1) if i in floats else a for i, a in enumerate(args)]
         self._function(*(a.reshape(-1) if isinstance(a, np.ndarray) else a for a in inside))

@@ -24,9 +24,6 @@ from piazzi.kernels.spec import KernelSpec, tried
 
 LOGGER = logging.getLogger("piazzi.kernels")
 MANIFEST = "manifest.json"
-# PIAZZI_JIT is read at every run, and the usual way takes as long as the rest of finding a kernel
-_environment: Any = getattr(os.environ, "_data", os.environ)
-_JIT, _OFF = ("PIAZZI_JIT", "0") if _environment is os.environ else map(os.environ.encodekey, ("PIAZZI_JIT", "0"))
 _spent: list[float] = []
 _loaded: dict[tuple[KernelSpec, bool], SimpleNamespace] = {}
 _making = threading.RLock()  # what is made may ask for another kernel
@@ -34,7 +31,7 @@ _making = threading.RLock()  # what is made may ask for another kernel
 
 def is_compiled() -> bool:
     """Whether kernels run compiled: ``PIAZZI_JIT=0`` runs their source as it is."""
-    return bool(_environment.get(_JIT) != _OFF)
+    return os.environ.get("PIAZZI_JIT") != "0"
 
 
 def load(spec: KernelSpec) -> SimpleNamespace:

@@ -73,22 +73,18 @@ class Layout:
         return out
 
     def bundles(self, moving: Problem) -> tuple[Run, Given, Stations]:
-        """Epochs, model and stations as kernels take them, for runs that move as `moving` says; the last ones are kept."""
-        kept: tuple[Problem, tuple[Run, Given, Stations]] | None = self.__dict__.get("_bundles")
-        if kept is None or kept[0] is not moving:
-            start, count, scale = moving.intervals(self.times)
-            run = Run(
-                epochs=len(self.times),
-                t_prior=start,
-                t=self.times,
-                count=count,
-                scale=scale,
-                first_row=self.first_row,
-                Q=moving.process_noise.covariance,
-            )
-            given = moving.given_over(start, float(self.times[-1]))
-            kept = self.__dict__["_bundles"] = moving, (run, given, self._stations(moving))
-        return kept[1]
+        """Epochs, model and stations as kernels take them, for runs that move as `moving` says."""
+        start, count, scale = moving.intervals(self.times)
+        run = Run(
+            epochs=len(self.times),
+            t_prior=start,
+            t=self.times,
+            count=count,
+            scale=scale,
+            first_row=self.first_row,
+            Q=moving.process_noise.covariance,
+        )
+        return run, moving.given_over(start, float(self.times[-1])), self._stations(moving)
 
     def _stations(self, moving: Problem) -> Stations:
         return Stations(
