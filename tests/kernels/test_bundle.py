@@ -140,7 +140,7 @@ def test_what_a_model_is_told_has_its_size(case):
     entry = kernels.load(problem.spec("transition", "rates")).evaluate_dynamics
     x = np.ones((1, problem.model.n))
     with pytest.raises(ValueError, match="kernel evaluate_dynamics: P is 7 in Given"):
-        entry(1, np.zeros(1), x, Given(parameters=np.zeros(7), manoeuvres=np.zeros(1)), np.empty_like(x))
+        entry(1, np.zeros(1), x, Given(parameters=np.zeros(7), manoeuvres=np.zeros(1), data=np.zeros(1)), np.empty_like(x))
 
 
 def test_what_is_remembered_does_not_grow():

@@ -21,7 +21,7 @@ from tests.waiting import HANGS
 
 PACKAGE = Path(piazzi.__file__).parent
 MODEL = pz.Model(["x"], ["-k*x"], parameters=["k"])
-GIVEN = Given(parameters=np.full(1, 0.5), manoeuvres=np.zeros(1))
+GIVEN = Given(parameters=np.full(1, 0.5), manoeuvres=np.zeros(1), data=np.zeros(1))
 SMALL = KernelSpec(MODEL, pz.Taylor(1).scheme, ("transition", "rates"))
 
 

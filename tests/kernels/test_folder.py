@@ -18,7 +18,7 @@ from piazzi.kernels import KernelSpec, cache, folder, ownership
 from piazzi.kernels.bundle import Given
 
 MODEL = pz.Model(["x"], ["-k*x"], parameters=["k"])
-GIVEN = Given(parameters=np.full(1, 0.5), manoeuvres=np.zeros(1))
+GIVEN = Given(parameters=np.full(1, 0.5), manoeuvres=np.zeros(1), data=np.zeros(1))
 SMALL = KernelSpec(MODEL, pz.Taylor(1).scheme, ("transition", "rates"))
 NOBODY = 65534
 
