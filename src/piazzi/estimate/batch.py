@@ -16,7 +16,7 @@ from piazzi.estimate.estimator import Estimate, Stopwatch, View
 from piazzi.estimate.factor_graph import FactorGraph
 from piazzi.estimate.gauss_newton import Outcome, optimize
 from piazzi.estimate.width import undetermined
-from piazzi.kernels.spec import lanes_for
+from piazzi.kernels.spec import FILLS_REGISTERS
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.arcs import Arc, arc
 from piazzi.problem.checks import Array, numeric
@@ -54,8 +54,8 @@ class OrbitChain(Chain):
     def applies(problem: Problem, inputs: Inputs) -> bool:
         """Whether it is the faster way."""
         assert problem.integrator is not None
-        if not (problem.moves_in_lanes and lanes_for(problem.model.n) > 1):
-            return True
+        if not problem.moves_in_lanes or problem.model.n > FILLS_REGISTERS:
+            return True  # with lanes or without them: the way, and so the rounding, is a matter of the problem alone
         return bool(problem.integrator.arc_scheme) and problem.steps(float(inputs.t[0]), float(inputs.t[-1])).grid is not None
 
 
