@@ -16,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = Path(__file__).with_name("commands.py")
-EXTRA = "cluster"  # what a user may ask for beyond what is always there
+EXTRAS = ("cluster", "jpl")  # what a user may ask for beyond what is always there
 
 
 def parts(requirement: str) -> tuple[str, str, str]:
@@ -45,9 +45,9 @@ def newest(requirement: str) -> str:
 
 
 def requirements() -> list[str]:
-    """What Piazzi needs, that extra included."""
+    """What Piazzi needs, these extras included."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    return [*project["dependencies"], *project["optional-dependencies"][EXTRA]]
+    return [*project["dependencies"], *(r for extra in EXTRAS for r in project["optional-dependencies"][extra])]
 
 
 def main(which: str) -> int:
@@ -59,7 +59,7 @@ def main(which: str) -> int:
     pip = [python, "-m", "pip", "-q", "-q", "--no-input", "--disable-pip-version-check", "install", "--no-compile"]
     if which == "lowest":
         (place / "constraints.txt").write_text("\n".join(map(lowest, requirements())))
-        steps = [[*pip, "-c", place / "constraints.txt", f"{ROOT}[{EXTRA}]"]]
+        steps = [[*pip, "-c", place / "constraints.txt", f"{ROOT}[{','.join(EXTRAS)}]"]]
     else:
         steps = [[*pip, *map(newest, requirements())], [*pip, "--no-deps", ROOT]]
     environment = {**os.environ, "PIAZZI_CACHE": str(place / "kernels")}
