@@ -119,6 +119,7 @@ def test_a_session_goes_on_where_the_data_were_not_yet_wanted(scenario):
         ("push(t)", "push(t, x)", r"push takes 1 argument, got 2"),
         ("push(t)", "pusj(t)", r"'pusj' is not a function; did you mean 'push'"),
         ("push(t)", "push(z)", r"definitions\.a.*unknown name 'z'"),
+        ("push(t)", "push(t_value)", r"definitions\.a.*unknown name 't_value'"),
         ("d/10 - tau", "d/10 - tua", r"roots\.tau\.root.*unknown name 'tua'"),
         ('root = "d/10 - tau"', 'iterations = 3', r"roots\.tau\.root.*is missing"),
         ("at(-tau)", "at(-tau, order=3)", r"write at\(offset\), or at\(offset, order=2\)"),

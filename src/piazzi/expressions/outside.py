@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection
 
-from piazzi.expressions import check, names
+from piazzi.expressions import check
 from piazzi.expressions.functions import TABLE
 from piazzi.expressions.language import Call, ExpressionError, Name, Negative, Node, Number, Power, Product, Sum, fold
 from piazzi.expressions.limits import read
@@ -85,16 +85,14 @@ def _written(node: Node, parts: list[str]) -> str:
 
 def check_calls(text: str, allowed: Collection[str], outside: Collection[str]) -> None:
     """Raise `ExpressionError` unless every name of an equation is allowed, within calls of functions from outside too."""
-    inside: list[str] = []
+    parts: list[str] = []
+    made: list[str] = []
 
     def stand_in(function: str, arguments: tuple[str, ...]) -> str:
-        inside.extend(arguments)
-        return f"{function}_{len(inside)}_value"
+        parts.extend(arguments)
+        made.append(f"{function}_{len(made)}_value")
+        return made[-1]
 
-    rest = split(text, outside, stand_in)
-    if not inside and rest == text:
-        check(text, allowed)
-        return
-    made = [name for part in (*inside, rest) for name in names(part) if name.endswith("_value")]
-    for part in (*inside, rest):
+    parts.append(split(text, outside, stand_in))
+    for part in parts:
         check(part, [*allowed, *made])

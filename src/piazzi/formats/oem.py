@@ -14,6 +14,7 @@ from piazzi.formats.ephemeris import Arc, Ephemeris
 from piazzi.formats.ndm import Item, Source, key_value, known, lines_of, shown
 from piazzi.formats.odm import Block, arc_of, metadata_of, one_system, unknown_axes
 from piazzi.formats.odm_keywords import HEADER
+from piazzi.formats.source import plain_lines
 
 Array = np.ndarray[Any, Any]
 _MARK = re.compile(rb"^[ \t]*(META_START|META_STOP|COVARIANCE_START|COVARIANCE_STOP)[ \t]*$", re.MULTILINE)
@@ -29,8 +30,7 @@ def read_kvn(data: bytes, name: str, told: Conventions) -> Ephemeris:
         With file, line and reason, at the first line that is not of the format.
     """
     source = Source(name)
-    data = data.removeprefix(b"\xef\xbb\xbf")
-    data = data if b"\r" not in data else data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    data = plain_lines(data)
     marks = [(found[1], found.start(), min(found.end() + 1, len(data))) for found in _MARK.finditer(data)]
     end = marks[0][1] if marks else len(data)
     text = _Text(data, np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n")))

@@ -35,6 +35,12 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
     return data
 
 
+def plain_lines(data: bytes) -> bytes:
+    """The same text without a mark of byte order, its lines ended by line feeds alone."""
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    return data if b"\r" not in data else data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
 def _gunzipped(data: bytes, limit: int) -> bytes:
     out = bytearray()
     while data:

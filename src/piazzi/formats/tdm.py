@@ -12,6 +12,7 @@ from piazzi.formats.conventions import Conventions
 from piazzi.formats.markup import Element, walk
 from piazzi.formats.ndm import Item, Source, key_value, known, shown
 from piazzi.formats.observations import Observations
+from piazzi.formats.source import plain_lines
 from piazzi.formats.tdm_keywords import HEADER
 from piazzi.formats.tdm_rows import Rows
 from piazzi.formats.tdm_segment import meaning_of
@@ -31,8 +32,7 @@ def read_kvn(data: bytes, name: str, told: Conventions) -> Observations:
         With file, line and reason, at the first line that is not of the format.
     """
     source = Source(name)
-    data = data.removeprefix(b"\xef\xbb\xbf")
-    data = data if b"\r" not in data else data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    data = plain_lines(data)
     rows = Rows(source)
     where, line, first = 0, 1, True
     while where < len(data):

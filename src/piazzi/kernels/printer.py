@@ -212,10 +212,9 @@ def _define(writer: _Writer, stage: AnyStage) -> None:
         case Stage():
             _define_values(writer, stage)
         case Call():
-            place = f"p.data[{stage.place}]" if isinstance(stage.place, int) else writer.text(stage.place)
+            place = str(stage.place) if isinstance(stage.place, int) else f"int({writer.text(stage.place)})"
             arguments = [writer.atom(a) for a in stage.arguments]
-            place = place if isinstance(stage.place, int) else f"p.data[int({place})]"
-            call = f"{stage.function}({', '.join([*arguments, 'p.data', f'int({place})'])})"
+            call = f"{stage.function}({', '.join([*arguments, 'p.data', f'int(p.data[{place}])'])})"
             writer.lines.append(f"({', '.join(writer.defines(s) for s in stage.symbols)},) = {call}")
         case Elsewhen():
             _define_elsewhen(writer, stage)

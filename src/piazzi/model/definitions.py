@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -201,9 +201,6 @@ def needed(wanted: Iterable[str], *layers: Definitions) -> frozenset[str]:
             if name in definitions:
                 waiting += (*definitions[name].names, *definitions[name].needs)
     return frozenset(found)
-
-
-Evaluator = Callable[[Definition, dict[str, float]], Sequence[float]]
 
 
 def unused(definitions: Definitions, users: Sequence[str]) -> list[str]:

@@ -104,7 +104,6 @@ def block_of(recipes: Sequence[Recipe], first: float, last: float) -> Array:
     parts = [np.asarray(recipe.block(first, last), dtype=float) for recipe in recipes]
     ends = np.cumsum([whole_registers(count) for count in (len(recipes), *map(len, parts))])
     block = aligned(max(int(ends[-1]), 1))
-    block[:] = 0.0
     for i, (at, part) in enumerate(zip(ends, parts, strict=False)):
         block[i], block[at : at + len(part)] = at, part
     block.setflags(write=False)
