@@ -18,7 +18,7 @@ from piazzi.estimate.live import LiveFilter
 from piazzi.estimate.root import linear_root, root_estimate
 from piazzi.estimate.soundness import check_start
 from piazzi.estimate.width import TOO_WIDE, too_wide
-from piazzi.kernels.bundle import Belief, Beliefs, Innovations, Interval
+from piazzi.kernels.bundle import Belief, Beliefs, Innovations
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
 from piazzi.problem.inputs import Inputs, measured_by, prepare
@@ -174,8 +174,8 @@ def predict(problem: Problem, belief: Any, t: float, dt: float) -> Prediction:
     Phi, Q = np.empty_like(P), np.empty_like(P)
     library = kernels.load(problem.spec("transition", problem.noise_fragment, "predict"))
     belief, noise = Belief(mean=x, covariance=P), problem.process_noise.covariance
-    span = Interval(t=float(t), dt=float(dt), count=count, scale=scale)
-    library.predict_once(span, problem.given_over(t, t + dt), noise, belief, Phi, Q)
+    clock = np.array([float(t), float(dt), scale])
+    library.predict_once(clock, np.array([count]), problem.given_over(t, t + dt), noise, belief, Phi, Q)
     return Prediction(x, P, Phi, Q)
 
 

@@ -16,7 +16,7 @@ from piazzi.estimate.saved import MOST_STEPS, Saved, check_order, check_steps
 from piazzi.estimate.session import Session
 from piazzi.estimate.stretch import Stretch
 from piazzi.estimate.width import too_wide_message
-from piazzi.kernels.bundle import Belief, Chain, Innovations, Interval, Run, Window
+from piazzi.kernels.bundle import Belief, Chain, Innovations, Run, Window
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
@@ -74,6 +74,7 @@ class LiveWindow(Session):
         self.widest = np.zeros(1)  # largest predicted variance of a measurement so far, in units of its noise
         self._window = Stretch(n, m)
         self._span, self._unread = np.zeros(2, dtype=np.int64), np.zeros((2, n, n))
+        self._times, self._count, self._carried = np.zeros(3), np.array([1]), (np.zeros(n), np.zeros((n, n)))
         self._bind()
 
     _pending: float | None
@@ -111,10 +112,13 @@ class LiveWindow(Session):
 
     def _predict_belief(self, now: float, dt: float, mean: Array, covariance: Array) -> None:
         """Predict a belief in place."""
-        p, (count, scale) = self.problem, self._clock.step(dt)
-        Q = p.process_noise.covariance
-        interval, belief = Interval(t=now, dt=dt, count=count, scale=scale), Belief(mean=mean, covariance=covariance)
-        self._library.predict_once(interval, p.given_bundle, Q, belief, *self._unread)
+        self._rebind()
+        into, times = self._carried, self._times
+        times[0], times[1] = now, dt
+        self._count[0], times[2] = self._clock.step(dt)
+        into[0][:], into[1][:] = mean, covariance
+        self._predict_in_place()
+        mean[:], covariance[:] = into
 
     def update(self, station: str, z: Any, t: float | None = None) -> bool:
         """Take in a measurement, at `t` or where the last prediction stands; whether it was inside the window.
@@ -266,6 +270,10 @@ class LiveWindow(Session):
         )
         self._given = p.given_bundle
         library, span, given = self._library, self._span, self._given
+        carried = Belief(mean=self._carried[0], covariance=self._carried[1])
+        self._predict_in_place: Callable[[], None] = library.predict_once.bind(
+            self._times, self._count, given, p.process_noise.covariance, carried, *self._unread
+        )
         innovations = Innovations(nu=self._nu, S=self._S)
         measured = measured_by(p, w.z, w.station)
         self._predict_once: Callable[[], None] = library.live_append.bind(span, run, given, chain)

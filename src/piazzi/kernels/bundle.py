@@ -38,10 +38,6 @@ class Belief(Bundle, mean="N", covariance="N N"):
     """A belief about one state: a prior, a prediction, or where an estimate stands."""
 
 
-class Interval(Bundle, t="float", dt="float", count="int", scale="float"):
-    """From when, over how many seconds, in how many substeps, and the scale of its process noise."""
-
-
 class Beliefs(Bundle, mean="K N", covariance="K N N"):
     """Beliefs at all epochs, which a kernel writes."""
 

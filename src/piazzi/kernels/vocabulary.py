@@ -20,7 +20,6 @@ from piazzi.kernels.bundle import (  # noqa: F401
     Gate,
     Given,
     Innovations,
-    Interval,
     JointRoot,
     Measured,
     Noiseless,

@@ -1,12 +1,12 @@
-"""One prediction of a belief, in place."""
+"""One prediction of a belief, in place; `clock` holds its time, the seconds that it goes on, and the scale of the noise."""
 
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
-def predict_once(interval: Interval, p: Given, Q: Array, belief: Belief, Phi_out: Array, Q_out: Array) -> None:
+def predict_once(clock: Array, count: Indices, p: Given, Q: Array, belief: Belief, Phi_out: Array, Q_out: Array) -> None:
     x, Q_unit = load_vector(belief.mean, 0, N), load_matrix(Q, 0, N, N)
-    x, Phi, Q_step = advance(interval.t, interval.dt, interval.count, x, p, Q_unit, interval.scale)
+    x, Phi, Q_step = advance(clock[0], clock[1], count[0], x, p, Q_unit, clock[2])
     store(belief.mean, 0, x)
     store(belief.covariance, 0, symmetric(Phi @ load_matrix(belief.covariance, 0, N, N) @ Phi.T + Q_step))
     store(Phi_out, 0, Phi)
