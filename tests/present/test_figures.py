@@ -33,7 +33,8 @@ from piazzi.present.figures import (
 )
 from piazzi.present.figures.errors import claim_overlay
 from piazzi.present.figures.measured import residuals_of
-from piazzi.present.figures.pages import pages, save
+from piazzi.present.figures.pages import nearest, orbit_page, pages, save
+from piazzi.present.figures.space import planes
 from piazzi.present.figures.style import COLOURS, MOST_POINTS, colour_of, drawn, line_of
 from piazzi.scenarios import load_scenario
 
@@ -97,6 +98,24 @@ def test_a_model_without_positions_has_no_orbit(ax, ekf):
     problem = replace(ekf.problem, model=replace(ekf.problem.model, groups={}))
     with pytest.raises(ValueError, match='group "position"'):
         orbit(ax, replace(ekf, problem=problem))
+
+
+def test_an_orbit_in_space_is_seen_from_three_sides(ax):
+    model = pz.Model(
+        ["x", "y", "z"],
+        {"x": "0", "y": "0", "z": "0"},
+        pz.Sensor("place", ["x", "y", "z"]),
+        groups={"position": ["x", "y", "z"]},
+    )
+    problem = pz.Problem(
+        model, pz.Gaussian([1.0, 2.0, 3.0], [1.0] * 3), [1e-3] * 3, pz.Station("a", "place", [0.1] * 3), prior_time=0.0
+    )
+    tracking = pz.simulate(problem, np.arange(4.0), np.random.default_rng(1))
+    assert planes(problem) == [(0, 1), (0, 2), (1, 2)]
+    comparison = pz.compare(problem, tracking, {"ekf": pz.ExtendedKalmanFilter(), "graph": pz.FactorGraph()})
+    figure = orbit_page(comparison)
+    assert [a.get_ylabel()[0] for a in figure.axes] == ["y", "z", "z", "y"]
+    assert nearest(comparison)[0][0] == "graph"
 
 
 def test_last_positions_are_relative_to_the_truth(ax, comparison, ekf):

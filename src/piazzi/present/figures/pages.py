@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.comparison import Comparison
-from piazzi.evaluate.metrics import errors, groups
+from piazzi.evaluate.metrics import errors, groups, rmse
 from piazzi.io.atomic import atomic_path
 from piazzi.present.figures.errors import (
     claim_overlay,
@@ -21,7 +22,7 @@ from piazzi.present.figures.errors import (
     state_error,
 )
 from piazzi.present.figures.measured import innovations, measurements, passes
-from piazzi.present.figures.space import orbit, position_at, position_columns
+from piazzi.present.figures.space import orbit, planes, position_at, position_columns
 from piazzi.present.figures.style import MEASURED, RC, label_of, plain, symmetric_scale
 from piazzi.problem.gaps import in_passes
 
@@ -90,15 +91,33 @@ def _first(comparison: Comparison) -> tuple[str, Estimate]:
     return next(((name, e) for name, e in found if e.success), found[0])
 
 
+def nearest(comparison: Comparison) -> tuple[tuple[str, str], Estimate]:
+    """Name, view and estimate that is nearest to the truth in the last half, else the one that used most: the last that succeeded."""
+    found = {key: e for key, e in comparison.views.items() if e.success} or comparison.views
+    columns = comparison.problem.model.group_indices["position"]
+
+    def error(e: Estimate) -> float:
+        off = rmse(errors(e), columns, slice(len(e.times) // 2, None))
+        return inf if off is None else off
+
+    sizes = {key: error(e) for key, e in found.items()}
+    late = [key for key, e in found.items() if e.view == "delayed"] or [*found]
+    key = min(sizes, key=lambda key: sizes[key]) if min(sizes.values()) < inf else late[0]
+    return key, found[key]
+
+
 def orbit_page(comparison: Comparison, planet_radius: float | None = None) -> Figure:
     """The orbit with the planet, and where every estimator puts the object at the end."""
-    name, estimate = _first(comparison)
-    figure = _figure(10.5, 5.4)
-    left, right = figure.subplots(1, 2, width_ratios=(1.2, 1))
-    orbit(left, estimate, name=name, planet_radius=planet_radius)
-    left.set_title(f"Orbit by {plain(name)}")
-    position_at(right, comparison.views)
-    found = {label: handle for ax in (left, right) for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    (name, _), estimate = nearest(comparison)
+    found_planes = planes(comparison.problem)
+    figure = _figure(10.5, 5.4 if len(found_planes) == 1 else 9.6)
+    axes = figure.subplots(*((1, 2) if len(found_planes) == 1 else (2, 2)), squeeze=False).ravel()
+    for ax, plane in zip(axes, found_planes, strict=False):
+        orbit(ax, estimate, name=name, planet_radius=planet_radius, plane=plane)
+        ax.set_anchor("C")
+    axes[0].set_title(f"Orbit by {label_of(name, estimate.view)}")
+    position_at(axes[-1], comparison.views)
+    found = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=6)
     return figure
 

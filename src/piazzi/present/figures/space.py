@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.patches import Ellipse
 
 SIGMAS = 3.0
+MARKS = "osD^vP*X"
+_TURN = np.linspace(0.0, 2 * np.pi, 181)
+UNIT_CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
 
 
 def position_columns(problem: Problem) -> tuple[int, int] | None:
@@ -27,10 +31,26 @@ def position_columns(problem: Problem) -> tuple[int, int] | None:
     return (found[0], found[1]) if len(found) > 1 else None
 
 
+def planes(problem: Problem) -> list[tuple[int, int]]:
+    """Pairs of columns of the group "position" that together show it: one in a plane, three in space."""
+    found = problem.model.group_indices.get("position", ())[:3]
+    return list(combinations(found, 2))
+
+
 def orbit(
-    ax: Axes, estimate: Estimate, *, name: str = "estimate", planet_radius: float | None = None, ellipses: int = 9
+    ax: Axes,
+    estimate: Estimate,
+    *,
+    name: str = "estimate",
+    planet_radius: float | None = None,
+    ellipses: int = 9,
+    plane: tuple[int, int] | None = None,
 ) -> Axes:
-    """Estimated path and truth in the plane of the first two components of position, the planet to scale, and 3-sigma ellipses.
+    """Estimated path and truth in a plane, the planet to scale, and 3-sigma ellipses.
+
+    Parameters
+    ----------
+    plane : two columns of the state; else the first two components of position
 
     Raises
     ------
@@ -39,12 +59,12 @@ def orbit(
     """
     from matplotlib.patches import Circle
 
-    i, j = _columns(estimate.problem)
+    i, j = plane or _columns(estimate.problem)
     truth, path = known_truth(estimate), estimate.mean[:, [i, j]]
     show = _unit(estimate.problem, path if truth is None else truth[:, [i, j]])
     if planet_radius:
-        ax.add_patch(Circle((0, 0), planet_radius * show.factor, color=PLANET, lw=0, zorder=0.5))
-        ax.annotate("planet", (0, 0), ha="center", va="center", color="#44505A")
+        disc = Circle((0, 0), planet_radius * show.factor, color=PLANET, lw=0, zorder=0.5, label="central body, to scale")
+        ax.add_patch(disc)
     part = drawn(len(path))
     if truth is not None:
         ax.plot(*(truth[part][:, [i, j]].T * show.factor), color=TRUTH, lw=2.2, alpha=0.85, label="truth", zorder=2)
@@ -91,12 +111,15 @@ def position_at(ax: Axes, estimates: Mapping[tuple[str, str], Estimate], k: int 
     show = display_of(_unit_name(first.problem), sigma)
     names = tuple(name for name, _ in found)
     for n, ((name, view), e) in enumerate(found.items()):
-        style, width = line_of(name, view, names), 1.4 + 4.5 * (1 - n / len(found)) ** 2  # where two coincide, both are seen
+        style = line_of(name, view, names)
+        turns = (6 * n, (6, 6 * len(found) - 6)) if len(found) > 1 else "-"  # lines that coincide take turns
         patch = _ellipse(e.mean[k, [i, j]] - origin, e.covariance[k][np.ix_([i, j], [i, j])], show)
-        patch.set(fill=False, edgecolor=style["color"], linestyle=style["linestyle"], lw=width)
+        patch.set(fill=False, edgecolor=style["color"], linestyle=turns, lw=2.0)
         ax.add_patch(patch)
-        ax.plot(*((e.mean[k, [i, j]] - origin) * show.factor), "o", ms=2.5 + 1.5 * width, color=style["color"])
-        ax.plot([], [], **style, lw=1.6, label=label_of(name, view))
+        ax.plot(*patch.get_patch_transform().transform(UNIT_CIRCLE).T, color=style["color"], lw=0.6)
+        mark = {"marker": MARKS[n % len(MARKS)], "mfc": "none", "mew": 1.4, "ms": 7, "color": style["color"]}
+        ax.plot(*((e.mean[k, [i, j]] - origin) * show.factor), **mark, ls="none")
+        ax.plot([], [], **(style | mark), lw=1.6, label=label_of(name, view))
     if known:
         ax.plot(0, 0, "+", ms=12, mew=2, color=TRUTH, label="truth", zorder=4)
     ax.autoscale_view()
