@@ -92,7 +92,7 @@ def _first(comparison: Comparison) -> tuple[str, Estimate]:
 
 
 def nearest(comparison: Comparison) -> tuple[tuple[str, str], Estimate]:
-    """Name, view and estimate that is nearest to the truth in the last half, else the one that used most: the last that succeeded."""
+    """Name, view and estimate: the nearest to the truth in the last half, else the first that used later measurements."""
     found = {key: e for key, e in comparison.views.items() if e.success} or comparison.views
     columns = comparison.problem.model.group_indices["position"]
 
