@@ -2,6 +2,7 @@
 
 from piazzi.earth import media
 from piazzi.earth.bodies import BODIES, body
+from piazzi.earth.defaults import ForceChoice, default_forces, read_forces
 from piazzi.earth.eop import EOP, EOPTable, EOPWarning, read_eop
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import GravityField, gravity_field, read_gravity
@@ -30,9 +31,9 @@ from piazzi.earth.weather import Weather
 
 __all__ = [
     "BODIES", "EOP", "FRAMES", "LASER_SPHERES", "Body", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch",
-    "Forces", "Formula", "Gravity", "GravityField", "LaserSphere", "Place", "Rotation", "SpaceWeather",
+    "ForceChoice", "Forces", "Formula", "Gravity", "GravityField", "LaserSphere", "Place", "Rotation", "SpaceWeather",
     "SpaceWeatherWarning", "Station", "StationList", "StationWarning", "Weather", "azimuth_elevation_range", "body",
-    "geodetic_to_position", "gravity_field", "ilrs_stations", "laser_sphere", "media", "pole_tide", "position_to_geodetic",
-    "read_eop", "read_gravity", "read_space_weather", "read_stations", "rotation", "rotation_rate", "solid_tide",
-    "station_displacement", "transform", "up_north_east", "use_data",
+    "default_forces", "geodetic_to_position", "gravity_field", "ilrs_stations", "laser_sphere", "media", "pole_tide",
+    "position_to_geodetic", "read_eop", "read_forces", "read_gravity", "read_space_weather", "read_stations", "rotation",
+    "rotation_rate", "solid_tide", "station_displacement", "transform", "up_north_east", "use_data",
 ]  # fmt: skip

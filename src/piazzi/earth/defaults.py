@@ -1,0 +1,252 @@
+"""Which forces to take: by the height of an orbit, as text, as a table such as [earth] of a scenario, or none."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from math import ceil, log, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from piazzi.earth.constants import GM
+from piazzi.earth.eop import EOP, read_eop
+from piazzi.earth.epoch import Epoch
+from piazzi.earth.finding import check_kernel
+from piazzi.earth.forces import EMPIRICAL, Forces
+from piazzi.earth.scales import Orientation
+from piazzi.earth.tides import RADIUS
+from piazzi.opening import opened
+from piazzi.text import nearest
+from piazzi.units import Units, is_quantity
+
+DEGREES = (8, 12, 20, 40, 70)
+CUT = 1e-5  # of the central term at the lowest point, where the field is cut off
+AIR_BELOW = 1000e3  # m of height
+REFLECTED, DRAGGED = 0.013, 0.022  # m2/kg: coefficients 1.3 and 2.2 on 0.01 m2/kg, of a satellite that nobody knows
+NO = ("no", "none", "off", "false")
+YES = ("yes", "on", "true")
+LARGEST = 2**18  # bytes of a file of forces
+DATA = ("eop", "kernel")  # keys beside the fields of Forces
+
+
+@dataclass(frozen=True, eq=False)
+class ForceChoice:
+    """Forces with numbers of their coefficients and the data that they are computed with.
+
+    `values` has every parameter of the forces, those in `assumed` because nobody gave them; `source` says what was chosen by.
+    """
+
+    forces: Forces
+    source: str
+    values: Mapping[str, float] = field(default_factory=dict)
+    eop: Orientation | None = None
+    kernel: str | Path | None = None
+    assumed: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        usual = {"cr_a_m": REFLECTED, "cd_a_m": DRAGGED} | dict.fromkeys(EMPIRICAL, 0.0)
+        known = self.forces.parameters
+        for name in self.values:
+            if name not in known:
+                raise ValueError(f"{name} is no coefficient of these forces{nearest(name[:60], known)}")
+        given = {**self.forces.values, **self.values}
+        missing = [name for name in known if name not in given]
+        units = {"cr_a_m": " m2/kg", "cd_a_m": " m2/kg"}
+        said = tuple(f"{name} = {usual.get(name, 0.0):g}{units.get(name, '')}" for name in missing)
+        values = {name: given[name] if name in given else usual.get(name, 0.0) for name in known}
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "assumed", (*self.assumed, *said))
+
+    def functions(self, epoch: Epoch) -> dict[str, Any]:
+        """The data of a problem whose time zero is `epoch`."""
+        return self.forces.functions(epoch, self.eop, self.kernel)
+
+    def __str__(self) -> str:
+        f = self.forces
+        words = [f"{f.field.name} to degree {f.degree}", *f.bodies, *(f"{tide} tide" for tide in f.tides)]
+        words += ["relativity"] if f.relativity else []
+        words += [f"radiation ({f.radiation})"] if f.radiation else []
+        words += [f"drag ({f.drag})"] if f.drag else []
+        words += [f"constants along {', '.join(f.empirical)}"] if f.empirical else []
+        return f"{', '.join(words)} ({self.source})"
+
+
+def lowest_height(position: Any, velocity: Any) -> float:
+    """Height in m of the pericentre of a state above the Earth's mean equator."""
+    r, v = np.asarray(position, dtype=float), np.asarray(velocity, dtype=float)
+    mu, h = GM["earth"], np.cross(r, v)
+    size = float(h @ h) / mu
+    e = sqrt(max(1.0 + size * (float(v @ v) / mu - 2.0 / float(np.linalg.norm(r))), 0.0))
+    return size / (1.0 + e) - RADIUS
+
+
+def default_forces(height: float) -> ForceChoice:
+    """Forces for an orbit whose lowest point is so many metres above the Earth.
+
+    The degree of the field is the first of `DEGREES` whose terms are there below `CUT` of the central one, as they fall with
+    the power of the radius.  Air counts below 1000 km.
+    """
+    return ForceChoice(Forces(**_usual(height)), f"default at {height / 1e3:,.0f} km")
+
+
+def _usual(height: float) -> dict[str, Any]:
+    if not height > 0:
+        raise ValueError(f"the orbit comes down to {height / 1e3:,.0f} km: it is below the surface of the Earth")
+    wanted = ceil(log(CUT) / log(RADIUS / (RADIUS + height)))
+    degree = next((n for n in DEGREES if n >= wanted), DEGREES[-1])
+    out: dict[str, Any] = {"degree": degree, "radiation": "cannonball"}
+    if height < AIR_BELOW:
+        out |= {"drag": "exponential", "air_height": max(round(height, -4), 100e3)}
+    return out
+
+
+def read_forces(text: str, height: float) -> ForceChoice:
+    """What `text` says of the forces on an orbit whose lowest point is at that height (m).
+
+    Parameters
+    ----------
+    text : "default", "none" (two bodies), the name of a TOML file with a table [earth], or words such as
+        ``"gravity=EGM2008 degree=40 drag=exponential cd_a_m=0.02"``, which change what is usual for `earth.Forces`; with the
+        word ``default`` before them, what is usual at that height
+    height : m
+
+    Raises
+    ------
+    ValueError
+        For what is not known, with what is.
+    OSError
+        Where a file cannot be read.
+    """
+    words = text.split()
+    if words in ([], ["default"]):
+        return default_forces(height)
+    if words == ["none"]:
+        return ForceChoice(Forces(degree=0, bodies=(), tides=(), relativity=False), "two bodies")
+    if len(words) == 1 and "=" not in text:
+        if not text.lower().endswith(".toml"):
+            raise ValueError(
+                f"forces {text[:60]!r}: write default, none, a file .toml with [earth], or words such as "
+                "'gravity=EGM2008 degree=40 drag=exponential'"
+            )
+        return _of_file(Path(text))
+    base = _usual(height) if words[0] == "default" else {}
+    table: dict[str, Any] = {}
+    for word in words[words[0] == "default" :]:
+        name, equals, value = word.partition("=")
+        if not equals or not value:
+            raise ValueError(f"forces: {word[:60]!r} is not NAME=VALUE")
+        if name in table:
+            raise ValueError(f"forces: {name} is given twice")
+        table[name] = value
+    return forces_of(table, Path(), "as given", base)
+
+
+def forces_of(
+    table: Mapping[str, Any], folder: Path, source: str, base: Mapping[str, Any] | None = None, numbers: str = ""
+) -> ForceChoice:
+    """The forces of a table: fields of `earth.Forces`, `eop`, `kernel` and coefficients by their names.
+
+    Parameters
+    ----------
+    table : texts or values
+    folder : where files are that it names
+    source : what it is
+    base : fields that are otherwise than usual where the table does not have them
+    numbers : a place that coefficients are to be given at instead
+    """
+    known = {f.name: f for f in fields(Forces)}
+    given, values = dict(base or {}), dict[str, float]()
+    for name, value in table.items():
+        if name in known:
+            given[name] = force_field(name, value, folder)
+        elif name not in DATA:
+            values[name] = value
+    forces = Forces(**given)
+    for name, value in values.items():
+        if numbers or name not in forces.parameters:
+            there = [*known, *DATA, *([] if numbers else forces.parameters)]
+            hint = f": it belongs to {numbers}" if name in forces.parameters else nearest(name[:60], there)
+            raise ValueError(f"forces: {name[:60]} is not known{hint}")
+        values[name] = _number(name, value)
+    data = {name: read_data(name, table[name], folder) for name in DATA if name in table}
+    return ForceChoice(forces, source, values, **data)
+
+
+def force_field(name: str, value: Any, folder: Path) -> Any:
+    """The value of a field of `Forces`, from text or from what a TOML file has."""
+    (known,) = (f for f in fields(Forces) if f.name == name)
+    kind = set(re.findall(r"\w+", str(known.type)))
+    several = "Sequence" in kind
+    if isinstance(value, str):
+        word = value.strip()
+        if several:
+            return () if word.lower() in NO else tuple(part.strip() for part in word.split(",") if part.strip())
+        if word.lower() in (*NO, *YES) and name != "gravity":
+            return word.lower() in YES
+        if "Path" in kind and ("." in word or "/" in word):
+            return folder / word
+        if kind & {"int", "float"}:
+            value = _number(name, word)
+        else:
+            return word
+    if several and isinstance(value, list | tuple):
+        return tuple(value)
+    if "int" in kind and isinstance(value, float) and value.is_integer():
+        return int(value)
+    return _number(name, value) if "float" in kind else value
+
+
+def read_data(name: str, value: Any, folder: Path) -> Any:
+    """The orientation of the Earth, from a file of the IERS or as a table of constants; or the path of a kernel."""
+    if name == "kernel":
+        path = folder / str(value)
+        check_kernel(path)
+        return path
+    if isinstance(value, Mapping):
+        known = [f.name for f in fields(EOP)]
+        for key in value:
+            if key not in known:
+                raise ValueError(f"eop: {key[:60]!r} is not known{nearest(key[:60], known)}")
+        return EOP(**{key: _number(key, number) for key, number in value.items()})
+    return read_eop(folder / str(value))
+
+
+def _number(name: str, value: Any) -> float:
+    """A number in SI, from text with or without a unit."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"{name} is {value!r}; it must be a number")
+    if not isinstance(value, str):
+        return float(value)
+    if is_quantity(value):
+        size, unit = Units().quantity(value)
+        return size * unit.factor
+    try:
+        return float(value)
+    except ValueError:
+        raise ValueError(f"{name} is {value[:40]!r}; it must be a number") from None
+
+
+def _of_file(path: Path) -> ForceChoice:
+    with opened(path) as file:
+        content = file.read(LARGEST + 1)
+    try:
+        if len(content) > LARGEST:
+            raise ValueError(f"longer than {LARGEST} bytes")
+        tables = tomllib.loads(content.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: no TOML: {' '.join(str(error).split())}") from None
+    earth, numbers = tables.get("earth"), tables.get("parameters", {})
+    if not isinstance(earth, Mapping) or not isinstance(numbers, Mapping):
+        raise ValueError(f"{path}: there is no table [earth] in it, or [parameters] is no table")
+    flat = {key: value.get("value") if isinstance(value, Mapping) else value for key, value in numbers.items()}
+    try:
+        found = forces_of(earth, path.parent, path.name, numbers="[parameters]")
+        known = found.forces.parameters  # a scenario has others, of its own equations
+        values = {key: _number(key, value) for key, value in flat.items() if key in known}
+        return ForceChoice(found.forces, found.source, values, found.eop, found.kernel)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
