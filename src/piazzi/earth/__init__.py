@@ -1,6 +1,6 @@
 """The Earth: time scales, its orientation, frames, stations, Sun, Moon and planets."""
 
-from piazzi.earth import media
+from piazzi.earth import media, sensors
 from piazzi.earth.bodies import BODIES, body
 from piazzi.earth.defaults import ForceChoice, default_forces, read_forces
 from piazzi.earth.eop import EOP, EOPTable, EOPWarning, read_eop
@@ -35,5 +35,5 @@ __all__ = [
     "SpaceWeatherWarning", "Station", "StationList", "StationWarning", "Weather", "azimuth_elevation_range", "body",
     "default_forces", "geodetic_to_position", "gravity_field", "ilrs_stations", "laser_sphere", "media", "pole_tide",
     "position_to_geodetic", "read_eop", "read_forces", "read_gravity", "read_space_weather", "read_stations", "rotation",
-    "rotation_rate", "solid_tide", "station_displacement", "transform", "up_north_east", "use_data",
+    "rotation_rate", "sensors", "solid_tide", "station_displacement", "transform", "up_north_east", "use_data",
 ]  # fmt: skip

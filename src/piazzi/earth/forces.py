@@ -154,7 +154,7 @@ class Forces:
         ----------
         sensors : what the satellite is seen by
         parameters : mapping of name to role, for those of the forces that are estimated or considered, and for further ones;
-            further names alone are fixed
+            further names alone are fixed; those of `earth.sensors` are there already
         added : forces of one's own, mapping of state to text, such as ``{"vx": "thrust*cos(phi)"}``
         definitions, functions : that those and the sensors use
 
@@ -163,14 +163,17 @@ class Forces:
         ValueError
             As `Model` does; also for an addition to what is no state.
         """
+        seen = [sensors] if isinstance(sensors, Sensor) else list(sensors)
+        called = {name: signature for s in seen for name, signature in getattr(s, "signatures", {}).items()}
         roles = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters, "fixed")
-        every = dict.fromkeys(self.parameters, "fixed") | roles
+        every: dict[str, Any] = dict.fromkeys(self.parameters, "fixed")
+        for given in (*(getattr(s, "parameters", {}) for s in seen), roles):
+            every |= given
         dynamics = dict(self.dynamics)
         for state, text in (added or {}).items():
             if state not in dynamics:
                 raise ValueError(f"added has {state!r}, which is not a state{nearest(state, dynamics)}")
             dynamics[state] += f" + ({text})"
-        seen = [sensors] if isinstance(sensors, Sensor) else sensors
         texts = [*dynamics.values(), *map(str, (definitions or {}).values()), *(n for s in seen for n in s.free_names)]
         return Model(
             STATES,
@@ -180,7 +183,7 @@ class Forces:
             _GROUPS,
             _UNITS,
             definitions={**_used(self.definitions, texts), **(definitions or {})},
-            functions={**self.functions(_ANY), **(functions or {})},
+            functions={**self.functions(_ANY), **called, **(functions or {})},
         )
 
     def functions(self, epoch: Epoch, eop: Orientation | None = None, kernel: str | Path | None = None) -> dict[str, Any]:

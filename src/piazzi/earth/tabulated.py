@@ -43,7 +43,7 @@ class _Daily(Protocol):
     def at(self, epochs: list[Epoch]) -> Array: ...
 
 
-class _Tabulated:
+class Tabulated:
     """What tables over time have in common; `columns` is the signature of the table, which calls may wrap."""
 
     TERMS: ClassVar[int] = 10
@@ -92,7 +92,7 @@ def _day(recipe: _Daily, number: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Rotation(_Tabulated):
+class Rotation(Tabulated):
     """Turns components in one frame into those in another at a time: ``(t, x, y, z)`` to three.
 
     Both directions between two frames read one table of nine numbers.  It differs from `rotation` by less than 1e-11 rad.
@@ -132,7 +132,7 @@ class Rotation(_Tabulated):
     @cached_property
     def checksum(self) -> str:
         """Hash of what the table is."""
-        return checksum("rotation", self.frames, self.epoch.whole, self.epoch.fraction, _orientation(self.eop))
+        return checksum("rotation", self.frames, self.epoch.whole, self.epoch.fraction, orientation_key(self.eop))
 
     def at(self, epochs: list[Epoch]) -> Array:
         """The nine numbers, by rows, at instants, (K, 9)."""
@@ -156,7 +156,7 @@ class Rotation(_Tabulated):
 
 
 @dataclass(frozen=True)
-class Body(_Tabulated):
+class Body(Tabulated):
     """Where Sun, Moon or a planet is seen from the centre of the Earth, m on the axes of the GCRF: ``(t)`` to three.
 
     Parameters
@@ -203,7 +203,7 @@ class Body(_Tabulated):
 
 
 @dataclass(frozen=True)
-class Place(_Tabulated):
+class Place(Tabulated):
     """Position and velocity of a station on the axes of the GCRF (m, m/s): ``(t)`` to six.
 
     The plate's motion, and with `tides` those of the solid Earth and the pole, are in it.
@@ -229,7 +229,7 @@ class Place(_Tabulated):
     def checksum(self) -> str:
         """Hash of what the table is."""
         of = self.station.coordinates, self.station.eccentricities, self.epoch.whole, self.epoch.fraction
-        return checksum("station", *of, _orientation(self.eop), self.tides)
+        return checksum("station", *of, orientation_key(self.eop), self.tides)
 
     def at(self, epochs: list[Epoch]) -> Array:
         """Positions at instants, (K, 3)."""
@@ -258,7 +258,7 @@ class Place(_Tabulated):
         return self._columns(t[0], 6)[1][:, None]
 
 
-def _orientation(eop: Orientation | None) -> Iterable[Any]:
+def orientation_key(eop: Orientation | None) -> Iterable[Any]:
     """What tells one orientation of the Earth from another."""
     daily = getattr(eop, "daily_ut1_tai", None)
     return (repr(eop),) if daily is None else (getattr(eop, "source", ""), daily.tobytes().hex())

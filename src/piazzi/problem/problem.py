@@ -138,7 +138,8 @@ class Problem:
             noise = covariance(station.noise, sensor.width, what, sensor.components, definite=True)
             out.append(replace(station, noise=noise, numbers=self._numbers(station)))
         tables = outside.station_numbers(self.model, [s.place for s in out])
-        return tuple(replace(s, numbers={**s.numbers, **table}) for s, table in zip(out, tables, strict=True))
+        numbers = [dict(sorted({**s.numbers, **table}.items())) for s, table in zip(out, tables, strict=True)]
+        return tuple(replace(s, numbers=own) for s, own in zip(out, numbers, strict=True))
 
     def _numbers(self, station: Station) -> dict[str, float]:
         wanted = self.model.numbers(self.model.sensor(station.sensor))

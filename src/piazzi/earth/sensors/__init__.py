@@ -1,0 +1,10 @@
+"""Sensors of satellites: ordinary sensors, made of definitions, functions from outside and roots, with light time.
+
+States are those of `Forces`: x, y, z (m) and vx, vy, vz (m/s) on the axes of the GCRF.
+"""
+
+from piazzi.earth.sensors.instrument import Instrument
+from piazzi.earth.sensors.position import position
+from piazzi.earth.sensors.ranging import range  # noqa: A004
+
+__all__ = ["Instrument", "position", "range"]
