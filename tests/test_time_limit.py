@@ -14,7 +14,8 @@ import piazzi as pz
 from piazzi.expressions import ExpressionError, symbol, time_limit, to_sympy
 from piazzi.expressions.time_limit import TooSlowError, each_with_time_limit, with_time_limit
 from piazzi.kernels.generate import model_source
-from piazzi.model.derivation import derive, derive_sensor, jacobian
+from piazzi.model.derivation import derive, derive_sensor
+from piazzi.model.jacobian import jacobian
 from tests.waiting import HANGS
 
 SLOW = "1"

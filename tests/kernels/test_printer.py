@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from piazzi.expressions import FUNCTIONS, ExpressionError, symbol, to_sympy
 from piazzi.kernels import plain, printer
-from piazzi.model.derivation import jacobian
+from piazzi.model.jacobian import jacobian
 
 NAMES = ("x", "y", "z")
 SYMBOLS = {name: symbol(name) for name in NAMES}

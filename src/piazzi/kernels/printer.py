@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, TypeVar
 from piazzi.expressions import time_limit
 from piazzi.expressions.functions import of_sympy
 from piazzi.expressions.time_limit import TooSlowError, each_with_time_limit, with_time_limit
-from piazzi.model.derivation import Call, Elsewhen, Solve, Stage
+from piazzi.model.stages import Call, Elsewhen, Solve, Stage
 
 if TYPE_CHECKING:
     import sympy as sp
 
-    from piazzi.model.derivation import AnyStage
+    from piazzi.model.stages import AnyStage
 
     Spread = dict[sp.Symbol, sp.Expr]
 

@@ -2,93 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING
 
 from piazzi.expressions import symbol, to_sympy
-from piazzi.expressions.time_limit import TooSlowError, each_with_time_limit
-from piazzi.model.definitions import STEP, TIME, Definition, needed
-from piazzi.model.functions import AT, ROOT, STATION, STATION_TABLE, Signature
-from piazzi.model.sensor import Parameter, Sensor
+from piazzi.model.chain import Chain, Equations
+from piazzi.model.definitions import STEP, TIME, needed
+from piazzi.model.sensor import Sensor
+from piazzi.model.stages import AnyStage
 
 if TYPE_CHECKING:
     import sympy as sp
-
-
-class Equations(Protocol):
-    """What is derived of a `Model`, and shown."""
-
-    def __hash__(self) -> int: ...
-    @property
-    def names(self) -> tuple[str, ...]: ...
-    @property
-    def given(self) -> tuple[str, ...]: ...
-    @property
-    def dynamics(self) -> tuple[str, ...]: ...
-    @property
-    def memory(self) -> Any: ...
-    @property
-    def definitions(self) -> Any: ...
-    @property
-    def functions(self) -> Any: ...
-    @property
-    def slots(self) -> Mapping[str, int]: ...
-    @property
-    def discrete(self) -> bool: ...
-    @property
-    def parameters(self) -> tuple[Parameter, ...]: ...
-    @property
-    def sensors(self) -> tuple[Sensor, ...]: ...
-    def numbers(self, sensor: Sensor) -> tuple[str, ...]: ...
-
-
-@dataclass(frozen=True)
-class Stage:
-    """Values that are worked out together: symbols and what they are, in terms of symbols that came before."""
-
-    symbols: tuple[sp.Symbol, ...]
-    values: tuple[sp.Expr, ...]
-
-
-@dataclass(frozen=True)
-class Call:
-    """Values of a function from outside: `symbols` are its outputs, then its known derivatives where it is asked for them.
-
-    `place` is the number of its data: of the function, or a symbol that holds it.
-    """
-
-    symbols: tuple[sp.Symbol, ...]
-    function: str
-    arguments: tuple[sp.Expr, ...]
-    place: Any
-
-
-@dataclass(frozen=True)
-class Elsewhen:
-    """The state at t + offset by a step of the dynamics; its transition matrix, row by row, and its rates, where wanted."""
-
-    symbols: tuple[sp.Symbol, ...]
-    offset: sp.Expr
-    transition: tuple[sp.Symbol, ...] = ()
-    rates: tuple[sp.Symbol, ...] = ()
-
-
-@dataclass(frozen=True)
-class Solve:
-    """A root by Newton's method: what is worked out in each iteration at `unknown`, and what is zero there, with its slope."""
-
-    symbols: tuple[sp.Symbol, ...]
-    unknown: sp.Symbol
-    start: sp.Expr
-    iterations: int
-    inner: tuple[AnyStage, ...]
-    residual: sp.Expr
-    slope: sp.Expr
-
-
-AnyStage: TypeAlias = "Stage | Call | Elsewhen | Solve"
 
 
 @dataclass(frozen=True)
@@ -123,205 +48,6 @@ class SensorDerivation:
     partials: tuple[AnyStage, ...] = ()
 
 
-class _Chain:
-    """Definitions as symbols, each with its derivatives by the values `x`, which are symbols too.
-
-    `x` are the estimated values, and within a root its unknown besides.
-    """
-
-    def __init__(self, model: Equations, symbols: dict[str, sp.Symbol], x: Sequence[sp.Symbol]) -> None:
-        self.model, self.symbols, self.x = model, symbols, tuple(x)
-        self.values: list[AnyStage] = []
-        self.partials: list[AnyStage] = []
-        self._by_x: dict[sp.Symbol, dict[int, sp.Expr]] = {}  # definition -> number of the value -> derivative, or its symbol
-        self._lookups: dict[tuple[Any, ...], tuple[tuple[sp.Symbol, ...], bool]] = {}
-
-    def define(self, definitions: Sequence[Definition], wanted: Collection[str]) -> None:
-        """Add those of the definitions that are wanted; `symbols` gets their names."""
-        for d in definitions:
-            if not set(d.provides) & set(wanted):
-                continue
-            if d.function == ROOT:
-                self._root(d)
-            elif d.function == AT:
-                self._elsewhen(d)
-            elif d.function:
-                self._call(d)
-            else:
-                self._value(d.names[0], to_sympy(d.texts[0], self.symbols))
-
-    def define_dynamics(self) -> None:
-        """Add the definitions that the dynamics need and that are not there yet."""
-        missing = [d for d in self.model.definitions if d.names[0] not in self.symbols]
-        self.define(missing, needed(self.model.dynamics, self.model.definitions))
-
-    def _new(self, name: str) -> sp.Symbol:
-        """A symbol for a name, another one each time where a root works it out twice."""
-        import sympy as sp
-
-        new = symbol(name) if name not in self.symbols else sp.Dummy(name, real=True)
-        self.symbols[name] = new
-        return new
-
-    def _value(self, name: str, value: sp.Expr) -> None:
-        import sympy as sp
-
-        row = self.derivative(sp.Matrix([value]))
-        new = self._new(name)
-        slopes = {j: row[0, j] for j in range(len(self.x)) if row[0, j] != 0}
-        self._known(new, value, slopes)
-
-    def _known(self, new: sp.Symbol, value: sp.Expr, slopes: Mapping[int, sp.Expr]) -> None:
-        """A stage of a value and its derivatives."""
-        import sympy as sp
-
-        named = {j: sp.Dummy(f"{new}_by_{self.x[j]}", real=True) for j, slope in slopes.items() if slope.free_symbols}
-        self.values.append(Stage((new,), (value,)))
-        self.partials.append(Stage((new, *named.values()), (value, *(slopes[j] for j in named))))
-        self._by_x[new] = dict(slopes) | named
-
-    def _call(self, d: Definition) -> None:
-        """Outputs of a function from outside; a rotation is a table of nine numbers and three sums."""
-        arguments = tuple(to_sympy(text, self.symbols) for text in d.texts)
-        if d.function == STATION:
-            signature, place = Signature.of_station(), self.symbols[STATION_TABLE]
-        else:
-            signature, place = dict(self.model.functions)[d.function], self.model.slots[d.function]
-        if signature.kind == "rotation":
-            self._rotation(d, signature, place, arguments)
-            return
-        for name, new in zip(d.names, self._outputs(d.function, signature, place, arguments), strict=False):
-            self.symbols[name] = new
-
-    def _outputs(self, name: str, signature: Signature, place: Any, arguments: tuple[sp.Expr, ...]) -> tuple[sp.Symbol, ...]:
-        """Symbols of the outputs of a call, which is made once for each set of arguments."""
-        import sympy as sp
-
-        by_argument = self.derivative(sp.Matrix(arguments))
-        used = [j for j in range(len(self.x)) if any(by_argument[k, j] != 0 for k in range(len(arguments)))]
-        key = (signature.function, place, arguments)
-        if key in self._lookups:
-            return self._lookups[key]
-        outputs = tuple(sp.Dummy(f"{name}_{i}", real=True) for i in range(signature.outputs))
-        self._lookups[key] = outputs
-        self.values.append(Call(outputs, signature.function, arguments, place))
-        if not used:
-            self.partials.append(self.values[-1])
-            self._by_x |= {o: {} for o in outputs}
-            return outputs
-        known = {(i, k): sp.Dummy(f"{name}_{i}_by_{k}", real=True) for i, k in signature.partials}
-        self.partials.append(Call((*outputs, *known.values()), f"{signature.function}_partials", arguments, place))
-        for i, o in enumerate(outputs):
-            slopes = {j: sum(known[i, k] * by_argument[k, j] for k in range(len(arguments)) if (i, k) in known) for j in used}
-            self._slopes(o, {j: slope for j, slope in slopes.items() if slope != 0})
-        return outputs
-
-    def _slopes(self, new: sp.Symbol, slopes: Mapping[int, sp.Expr]) -> None:
-        """A stage of the derivatives of a value that is there already."""
-        import sympy as sp
-
-        named = {
-            j: sp.Dummy(f"{new}_by_{self.x[j]}", real=True)
-            for j, slope in slopes.items()
-            if slope.free_symbols and not slope.is_Symbol
-        }
-        if named:
-            self.partials.append(Stage(tuple(named.values()), tuple(slopes[j] for j in named)))
-        self._by_x[new] = dict(slopes) | named
-
-    def _rotation(self, d: Definition, signature: Signature, place: Any, arguments: tuple[sp.Expr, ...]) -> None:
-        import sympy as sp
-
-        table = Signature.of_table(9, signature.terms)
-        W = sp.Matrix(3, 3, self._outputs(d.function, table, place, arguments[:1]))
-        turned = (W.T if signature.transposed else W) * sp.Matrix(arguments[1:])
-        for name, value in zip(d.names, turned, strict=False):
-            self._value(name, value)
-
-    def _elsewhen(self, d: Definition) -> None:
-        """The states at another instant: to second order in the offset, or by a step of the dynamics."""
-        import sympy as sp
-
-        offset = to_sympy(d.texts[0], self.symbols)
-        states = [symbol(name) for name in self.model.names]
-        if len(d.texts) > 1:
-            self.define_dynamics()
-            rates = dict(zip(states, (to_sympy(e, self.symbols) for e in self.model.dynamics), strict=False))
-            for name, state in zip(d.names, states, strict=False):
-                rate = rates[state]
-                second = rates.get(rate) if rate.is_Symbol else None
-                self._value(name, state + offset * rate + (offset**2 / 2 * second if second is not None else 0))
-            return
-        n, nd = len(states), len(self.model.dynamics)
-        by_offset = self.derivative(sp.Matrix([offset]))
-        outputs = tuple(self._new(name) for name in d.names)
-        everything = outputs + tuple(sp.Dummy(f"{states[i]}_then", real=True) for i in range(len(outputs), nd))
-        self.values.append(Elsewhen(everything, offset))
-        Phi = tuple(sp.Dummy(f"Phi_{i}_{j}", real=True) for i in range(nd) for j in range(n))
-        rates_there = tuple(sp.Dummy(f"f_{i}_then", real=True) for i in range(nd))
-        self.partials.append(Elsewhen(everything, offset, Phi, rates_there))
-        for i, new in enumerate(outputs):
-            slopes = {j: rates_there[i] * by_offset[0, j] for j in range(len(self.x)) if by_offset[0, j] != 0}
-            for j, value in enumerate(self.x):
-                if value in states:
-                    slopes[j] = slopes.get(j, 0) + Phi[i * n + states.index(value)]
-            self._slopes(new, slopes)
-
-    def _root(self, d: Definition) -> None:
-        """The solution, by Newton's method; its derivative by the implicit function theorem, -(dg/dtau)^-1 dg/dx."""
-        import sympy as sp
-
-        (name,), (equation, start) = d.names, d.texts
-        if any(call.function == AT and len(call.texts) > 1 for call in d.calls):
-            self.define_dynamics()  # here, so that no iteration works them out again
-        trial = sp.Dummy(name, real=True)
-        newton = _Chain(self.model, {**self.symbols, name: trial}, [trial])
-        wanted = {n for inner in d.inner for n in inner.provides}
-        newton.define(d.inner, wanted)
-        g = sp.Matrix([to_sympy(equation, newton.symbols)])
-        slope = newton.derivative(g)[0, 0]
-        if slope == 0:
-            raise ValueError(f"root {name!r}: its equation does not depend on {name!r}")
-        tau = self._new(name)
-        first = to_sympy(start, self.symbols)
-        solve = Solve((tau,), trial, first, d.iterations, tuple(newton.partials), g[0, 0], slope)
-        self.values.append(solve)
-        self.partials.append(solve)
-        n = len(self.x)
-        there = _Chain(self.model, self.symbols, [*self.x, tau])
-        there._by_x = dict(self._by_x)
-        there.define(d.inner, wanted)
-        row = there.derivative(sp.Matrix([to_sympy(equation, self.symbols)]))
-        self.values += there.values
-        self.partials += there.partials
-        self._slopes(tau, {j: -row[0, j] / row[0, n] for j in range(n) if row[0, j] != 0})
-        for new, slopes in there._by_x.items():
-            if new not in self._by_x:
-                total = {
-                    j: slopes.get(j, 0) + slopes.get(n, 0) * self._by_x[tau].get(j, 0)
-                    for j in range(n)
-                    if j in slopes or (n in slopes and j in self._by_x[tau])
-                }
-                self._slopes(new, total)
-
-    def derivative(self, f: sp.Matrix) -> sp.Matrix:
-        """df/dx with the derivatives of the definitions in f by their symbols: the chain rule, one link long."""
-        import sympy as sp
-
-        defined = [d for d in self._by_x if d in f.free_symbols]
-        if not defined:
-            return jacobian(f, self.x)
-        direct = jacobian(f, [*self.x, *defined])
-        n = len(self.x)
-        out = sp.MutableDenseMatrix(direct[:, :n])
-        for k, d in enumerate(defined):
-            for j, slope in self._by_x[d].items():
-                for i in range(f.rows):
-                    if direct[i, n + k] != 0:
-                        out[i, j] += direct[i, n + k] * slope
-        return sp.ImmutableMatrix(out)
-
-
 @lru_cache(maxsize=64)
 def derive(model: Equations) -> Derivation:
     """Dynamics and their Jacobian; raises ExpressionError for an equation outside the language."""
@@ -329,7 +55,7 @@ def derive(model: Equations) -> Derivation:
 
     symbols = {name: symbol(name) for name in (*model.names, *model.given, TIME, STEP)}
     x = tuple(symbols[name] for name in model.names)
-    chain = _Chain(model, symbols, x)
+    chain = Chain(model, symbols, x)
     chain.define(model.definitions, needed(model.dynamics, model.definitions))
     remembered = [symbols[name] if model.discrete else sp.Integer(0) for name, _ in model.memory]
     f = sp.Matrix([*(to_sympy(e, symbols) for e in model.dynamics), *remembered])
@@ -345,44 +71,13 @@ def derive_sensor(model: Equations, sensor: Sensor) -> SensorDerivation:
 
     own = model.numbers(sensor)
     symbols = {name: symbol(name) for name in (*model.names, *model.given, *own, TIME)}
-    chain = _Chain(model, symbols, [symbols[name] for name in model.names])
+    chain = Chain(model, symbols, [symbols[name] for name in model.names])
     numbers = tuple(symbols[name] for name in own)
     wanted = needed(sensor.equations, sensor.definitions, model.definitions)
     chain.define(model.definitions, wanted)
     chain.define(sensor.definitions, wanted)
     h = sp.Matrix([to_sympy(e, symbols) for e in sensor.equations])
     return SensorDerivation(h, chain.derivative(h), numbers, tuple(chain.values), tuple(chain.partials))
-
-
-def jacobian(f: sp.Matrix, x: Sequence[sp.Symbol]) -> sp.Matrix:
-    """df/dx where every value is real: the derivative of ``abs`` is ``sign``, and that of ``sign`` zero.
-
-    SymPy's own derivative of ``abs(log(x))`` allows for a complex logarithm, which has no compiled form.
-
-    Raises
-    ------
-    ValueError
-        Where SymPy takes more than 5 s for the derivatives of one equation.
-    """
-    import sympy as sp
-
-    class Sign(sp.Function):  # type: ignore[misc]
-        def fdiff(self, argindex: int = 1) -> Any:
-            return sp.S.Zero
-
-    class Magnitude(sp.Function):  # type: ignore[misc]
-        def fdiff(self, argindex: int = 1) -> Any:
-            return Sign(self.args[0])
-
-    def row(i: int) -> sp.Matrix:
-        real = f[i, :].replace(sp.Abs, Magnitude).replace(sp.sign, Sign)
-        return real.jacobian(list(x)).replace(Magnitude, sp.Abs).replace(Sign, sp.sign)
-
-    try:
-        rows = each_with_time_limit(row, range(f.rows))
-    except TooSlowError as error:
-        raise ValueError(f"derivatives of equation {error.at + 1}: {error}") from None
-    return sp.Matrix(f.rows, len(x), [entry for found in rows for entry in found])
 
 
 def constant_acceleration_step(model: Equations) -> tuple[tuple[sp.Expr, ...], sp.Symbol]:

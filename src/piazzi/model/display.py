@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from piazzi.model.derivation import AnyStage, Call, Elsewhen, Equations, Solve, Stage, derive, derive_sensor
+from piazzi.model.chain import Equations
+from piazzi.model.derivation import derive, derive_sensor
+from piazzi.model.stages import AnyStage, Call, Elsewhen, Solve, Stage
 
 
 def sections(model: Equations) -> list[tuple[str, Any]]:
