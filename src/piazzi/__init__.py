@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from piazzi.model import Model, Parameter, Sensor
     from piazzi.orbit import kepler_transition, propagate_kepler
     from piazzi.orbit.difference import difference
+    from piazzi.outside.function import Function
+    from piazzi.outside.interpolation import Interpolation
     from piazzi.outside.table import Table
     from piazzi.present.report import write_report
     from piazzi.problem import (
@@ -101,6 +103,8 @@ _WHERE = {
         "piazzi.estimate.prior": "with_prior_at",
         "piazzi.estimate.substeps": "choose_substeps substep_error",
         "piazzi.loading": "load",
+        "piazzi.outside.function": "Function",
+        "piazzi.outside.interpolation": "Interpolation",
         "piazzi.outside.table": "Table",
         "piazzi.evaluate.comparison": "Comparison compare",
         "piazzi.evaluate.observable": "Observability",
@@ -118,13 +122,14 @@ __version__ = "0.1.0"
 __all__ = [
     "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Discrete", "DormandPrince",
     "DormandPrince5", "Ephemeris", "Epoch", "Estimate", "Euler", "ExtendedKalmanFilter", "FactorGraph", "Forecast",
-    "GaussJackson", "Gaussian", "Heun", "Huber", "Integrator", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow",
-    "Manoeuvre", "Midpoint", "Model", "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem",
-    "ProcessNoise", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother",
-    "SquareRootKalmanFilter", "Station", "Study", "Table", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter",
-    "Updated", "WindowTrade", "choose_substeps", "compare", "difference", "earth", "formats", "kepler_transition",
-    "load", "observability", "orbit", "passes", "predict", "propagate_kepler", "read_ephemeris", "read_store", "read_tracking",
-    "simulate", "step_warning", "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
+    "Function", "GaussJackson", "Gaussian", "Heun", "Huber", "Integrator", "Interpolation", "Kepler", "LiveFilter",
+    "LiveRootFilter", "LiveWindow", "Manoeuvre", "Midpoint", "Model", "Observability", "Observations", "Parameter", "Pass",
+    "Prediction", "Problem", "ProcessNoise", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor",
+    "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station", "Study", "Table", "Taylor", "Tracking", "Truth",
+    "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps", "compare", "difference", "earth",
+    "formats", "kepler_transition", "load", "observability", "orbit", "passes", "predict", "propagate_kepler",
+    "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning", "substep_error", "update", "windows",
+    "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip
 
 

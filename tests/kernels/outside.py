@@ -66,7 +66,7 @@ def called(signature: Signature, *, partials: bool, lanes: int = 8, single: tupl
         results=", ".join(results),
     )
     own = table_source(signature.outputs, signature.terms) if signature.terms else signature.code
-    shared = () if own else (f"function_{signature.kind}",)
+    shared = () if own else (signature.fragment,)
     lent = f"tried_{sha256((own + text).encode()).hexdigest()[:12]}"
     with kernels.fragment(lent, own + text):
         spec = KernelSpec(Model(["x"], ["0"], [], discrete=True), kernels.Discrete().scheme, (*shared, lent), lanes)

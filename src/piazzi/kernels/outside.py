@@ -8,8 +8,7 @@ from piazzi.model import Model
 
 def outside_fragments(model: Model) -> tuple[str, ...]:
     """Names of the package's fragments that the functions need."""
-    kinds = dict.fromkeys(s.kind for s in model.signatures if not s.terms and not s.code)
-    return tuple(f"function_{kind}" for kind in kinds)
+    return tuple(dict.fromkeys(s.fragment for s in model.signatures if not s.terms and not s.code))
 
 
 def outside_source(model: Model) -> str:

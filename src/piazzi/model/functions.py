@@ -43,6 +43,11 @@ class Signature:
         """Name of the function in the source of kernels."""
         return f"{self.kind}_{self.outputs}x{self.terms}" if self.terms else self.kind
 
+    @property
+    def fragment(self) -> str:
+        """Name of the package's fragment that has it."""
+        return f"function_{self.kind.partition('_')[0]}"
+
     @classmethod
     def of_table(cls, columns: int, terms: int) -> Signature:
         """The signature of a table over time, whose columns are all derived by it."""

@@ -27,7 +27,7 @@ def plain_functions(signature: Signature) -> tuple[Callable[..., Any], Callable[
     elif signature.code:
         module = module_of(_PLAIN + signature.code)
     else:
-        module = import_module(f"piazzi.kernels.fragments.function_{signature.kind}")
+        module = import_module(f"piazzi.kernels.fragments.{signature.fragment}")
     return getattr(module, signature.function), getattr(module, f"{signature.function}_partials")
 
 
@@ -35,14 +35,14 @@ def value(signature: Signature, block: Array, *arguments: float) -> tuple[float,
     """The outputs."""
     check_count(signature, arguments)
     with np.errstate(all="ignore"):
-        return tuple(float(v) for v in plain_functions(signature)[0](*map(float, arguments), block, 0))
+        return tuple(map(float, plain_functions(signature)[0](*map(np.float64, arguments), block, 0)))
 
 
 def derivatives(signature: Signature, block: Array, *arguments: float) -> Array:
     """The derivatives of the outputs (rows) by the arguments; zero where none is known."""
     check_count(signature, arguments)
     with np.errstate(all="ignore"):
-        found = plain_functions(signature)[1](*map(float, arguments), block, 0)[signature.outputs :]
+        found = plain_functions(signature)[1](*map(np.float64, arguments), block, 0)[signature.outputs :]
     out = np.zeros((signature.outputs, signature.arguments))
     for pair, entry in zip(signature.partials, found, strict=True):
         out[pair] = entry
@@ -54,6 +54,14 @@ def check_count(signature: Signature, arguments: tuple[float, ...]) -> None:
     if len(arguments) != signature.arguments:
         takes = f"{signature.arguments} argument{'' if signature.arguments == 1 else 's'}"
         raise ValueError(f"function {signature.kind} takes {takes}, not {len(arguments)}")
+
+
+def numbers(value: Any, what: str) -> Array:
+    """The value as an array of its own; raises ValueError where it is not made of numbers."""
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} must be made of numbers, in rows of equal length") from None
 
 
 def aligned(size: int) -> Array:

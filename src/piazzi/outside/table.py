@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.model.functions import Signature
-from piazzi.outside.evaluation import checksum, derivatives, value
+from piazzi.outside.evaluation import checksum, derivatives, numbers, value
 from piazzi.outside.pieces import ROUNDING, Pieces, pieces_of
 from piazzi.outside.samples import read_columns
 
@@ -45,7 +45,7 @@ class Table:
     terms: int = TERMS
 
     def __post_init__(self) -> None:
-        t, v = (np.array(a, dtype=float) for a in (self.times, self.values))
+        t, v = numbers(self.times, "times of a table"), numbers(self.values, "values of a table")
         v = v[:, None] if v.ndim == 1 else v
         if t.ndim != 1 or v.ndim != 2 or len(t) != len(v) or len(t) < 2 or not v.shape[1]:
             raise ValueError(f"a table has two or more times and a row of values for each, not {t.shape} and {v.shape}")

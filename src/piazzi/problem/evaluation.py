@@ -96,6 +96,26 @@ def singular_equation(
     return ""
 
 
+def check_own_functions(
+    model: Model, stations: Iterable[Station], numbers: Mapping[str, float], t: float, functions: Mapping[str, Any]
+) -> None:
+    """Raise ValueError where a function of the user's own, as it is called there, has other derivatives than differences."""
+    own = {name: function for name, function in functions.items() if hasattr(function, "check")}
+    if not own:
+        return
+    values = with_values({**numbers, "t": t, "dt": 1.0}, model.definitions, functions=functions, model=model)
+    here = [(values, model.definitions)]
+    for station in stations:
+        definitions = model.sensor(station.sensor).definitions
+        there = dict(functions) | {STATION: station.place}
+        here.append((with_values(values | dict(station.numbers), definitions, functions=there, model=model), definitions))
+    for known, call in ((known, call) for known, definitions in here for d in definitions for call in d.calls):
+        if call.function in own:
+            arguments = [evaluate(text, known) for text in call.texts]
+            if np.isfinite(arguments).all():
+                own[call.function].check(call.function, *arguments)
+
+
 def fragments_of(
     fragments: tuple[str, ...], integrator: Integrator, *, manoeuvres: bool, axes: str, noise_varies: bool, in_lanes: bool
 ) -> tuple[str, ...]:

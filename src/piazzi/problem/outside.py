@@ -6,13 +6,14 @@ functions come the tables of stations.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import ceil, floor
 from typing import Any, Protocol
 
 import numpy as np
 
 from piazzi.model import Model
+from piazzi.model.definitions import TIME
 from piazzi.model.functions import STATION_TABLE, Signature, signature_of
 from piazzi.outside.evaluation import aligned, whole_registers
 from piazzi.problem.checks import Array
@@ -89,14 +90,21 @@ def days(first: float, last: float) -> tuple[float, float]:
     return floor((first - MARGIN) / DAY) * DAY, ceil((last + MARGIN) / DAY) * DAY
 
 
-def check_span(functions: Mapping[str, Any], first: float, last: float) -> None:
+def spans_of(model: Model, functions: Mapping[str, Any]) -> tuple[tuple[str, tuple[float, float]], ...]:
+    """Functions that have values for some times only, with the first and the last of these."""
+    found = [(name, recipe.span) for name, recipe in functions.items() if recipe.span is not None]
+    for call in (call for owner in (model, *model.sensors) for d in owner.definitions for call in d.calls):
+        spans = getattr(functions.get(call.function), "spans", ())
+        found += [(call.function, s) for s, text in zip(spans, call.texts, strict=False) if s is not None and text == TIME]
+    return tuple(dict.fromkeys(found))
+
+
+def check_span(spans: Iterable[tuple[str, tuple[float, float]]], first: float, last: float) -> None:
     """Raise ValueError where a function has no values at some of these times."""
-    for name, recipe in functions.items():
-        if recipe.span is not None and not recipe.span[0] <= first <= last <= recipe.span[1]:
-            when = first if first < recipe.span[0] else last
-            raise ValueError(
-                f"{name!r} has values from t = {recipe.span[0]:g} to {recipe.span[1]:g} s, and t = {when:g} s is outside"
-            )
+    for name, span in spans:
+        if not span[0] <= first <= last <= span[1]:
+            when = first if first < span[0] else last
+            raise ValueError(f"{name!r} has values from t = {span[0]:g} to {span[1]:g} s, and t = {when:g} s is outside")
 
 
 def block_of(recipes: Sequence[Recipe], first: float, last: float) -> Array:

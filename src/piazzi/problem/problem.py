@@ -189,10 +189,12 @@ class Problem:
         return self.integrator
 
     def _check_regular(self) -> None:
-        """Refuse a prior mean at which an equation has no value, such as the centre of attraction."""
-        where = evaluation.singular_equation(self.model, self.stations, self._values(), self.prior_time or 0.0, self.functions)
+        """Refuse a prior mean where an equation has no value, or a function of the user's own has wrong derivatives."""
+        given = self.model, self.stations, self._values(), self.prior_time or 0.0, self.functions
+        where = evaluation.singular_equation(*given)
         if where:
             raise ValueError(where)
+        evaluation.check_own_functions(*given)
 
     def _values(self) -> dict[str, float]:
         """Values of states and parameters at the prior mean, by name."""
@@ -249,7 +251,7 @@ class Problem:
         """
         if not self._recipes:
             return False
-        outside.check_span(self.functions, first, last)
+        outside.check_span(self._spans, first, last)
         told = self.__dict__.get("_told")
         if told and told[0] <= first <= last <= told[1]:
             return False
@@ -280,6 +282,10 @@ class Problem:
     @cached_property
     def _recipes(self) -> tuple[outside.Recipe, ...]:
         return outside.recipes_of(self.model, self.functions, [s.place for s in self.stations])
+
+    @cached_property
+    def _spans(self) -> tuple[tuple[str, tuple[float, float]], ...]:
+        return outside.spans_of(self.model, self.functions)
 
     @property
     def prior_bundle(self) -> Belief:

@@ -37,6 +37,7 @@ def write_function(function: Any) -> dict[str, Any]:
     """The table that `read_functions` reads back; raises ValueError for a function that files cannot hold."""
     from piazzi.earth.gravity import Gravity
     from piazzi.earth.tabulated import Body, Rotation
+    from piazzi.outside.interpolation import Interpolation
     from piazzi.outside.table import Table as Samples
 
     if isinstance(function, Gravity) and isinstance(function.model, str | Path):
@@ -44,6 +45,10 @@ def write_function(function: Any) -> dict[str, Any]:
         return out | {"gradient_degree": function.gradient_degree, "on": function.on}
     if isinstance(function, Samples):
         out = {"kind": "table", "times": function.times.tolist(), "values": function.values.tolist(), "terms": function.terms}
+        return out if function.error is None else out | {"error": function.error}
+    if isinstance(function, Interpolation):
+        out = {"kind": "interpolation", **{name: x.tolist() for name, x in zip("xy", function.nodes, strict=False)}}
+        out |= {"values": function.values.tolist(), "outside": list(function.outside)}
         return out if function.error is None else out | {"error": function.error}
     if isinstance(function, Rotation) and function.eop is None:
         return {"kind": "rotation", "from": function.from_, "to": function.to}
@@ -80,6 +85,20 @@ def _samples(table: Table, epoch: Epoch | None) -> Any:
     return Samples(table.raw("times"), table.raw("values"), **options)
 
 
+def _interpolation(table: Table, epoch: Epoch | None) -> Any:
+    from piazzi.outside.interpolation import Interpolation
+
+    options = {key: table.raw(key) for key in ("outside", "error") if key in table}
+    file = table.text("file")
+    if file is not None:
+        return Interpolation.read(_path(table, file), **options)
+    if "x" not in table or "values" not in table:
+        table.fault("", "has no nodes: give file = a CSV, or x, y for two variables, and values")
+        return None
+    x, values = table.raw("x"), table.raw("values")
+    return Interpolation((x, table.raw("y")) if "y" in table else x, values, **options)
+
+
 def _rotation(table: Table, epoch: Epoch | None) -> Any:
     from piazzi.earth.tabulated import Rotation
 
@@ -109,4 +128,10 @@ def _undated(table: Table, epoch: Epoch | None) -> None:
         table.fault("kind", "needs dates: give the scenario an epoch, such as epoch = '2016-02-13T16:00:00 UTC'")
 
 
-KINDS: Mapping[str, Reader] = {"gravity": _gravity, "table": _samples, "rotation": _rotation, "body": _body}
+KINDS: Mapping[str, Reader] = {
+    "gravity": _gravity,
+    "table": _samples,
+    "interpolation": _interpolation,
+    "rotation": _rotation,
+    "body": _body,
+}
