@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from piazzi.model import Model
-from piazzi.model.definitions import TIME
+from piazzi.model.definitions import TIME, Definitions
 from piazzi.model.functions import STATION_TABLE, Signature, signature_of
 from piazzi.outside.evaluation import aligned, whole_registers
 from piazzi.problem.checks import Array
@@ -93,7 +93,8 @@ def days(first: float, last: float) -> tuple[float, float]:
 def spans_of(model: Model, functions: Mapping[str, Any]) -> tuple[tuple[str, tuple[float, float]], ...]:
     """Functions that have values for some times only, with the first and the last of these."""
     found = [(name, recipe.span) for name, recipe in functions.items() if recipe.span is not None]
-    for call in (call for owner in (model, *model.sensors) for d in owner.definitions for call in d.calls):
+    layers: list[Definitions] = [model.definitions, *(sensor.definitions for sensor in model.sensors)]
+    for call in (call for layer in layers for d in layer for call in d.calls):
         spans = getattr(functions.get(call.function), "spans", ())
         found += [(call.function, s) for s, text in zip(spans, call.texts, strict=False) if s is not None and text == TIME]
     return tuple(dict.fromkeys(found))

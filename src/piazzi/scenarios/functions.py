@@ -41,14 +41,14 @@ def write_function(function: Any) -> dict[str, Any]:
     from piazzi.outside.table import Table as Samples
 
     if isinstance(function, Gravity) and isinstance(function.model, str | Path):
-        out = {"kind": "gravity", "model": str(function.model), "degree": function.degree}
+        out: dict[str, Any] = {"kind": "gravity", "model": str(function.model), "degree": function.degree}
         return out | {"gradient_degree": function.gradient_degree, "on": function.on}
     if isinstance(function, Samples):
         out = {"kind": "table", "times": function.times.tolist(), "values": function.values.tolist(), "terms": function.terms}
         return out if function.error is None else out | {"error": function.error}
     if isinstance(function, Interpolation):
-        out = {"kind": "interpolation", **{name: x.tolist() for name, x in zip("xy", function.nodes, strict=False)}}
-        out |= {"values": function.values.tolist(), "outside": list(function.outside)}
+        nodes = {name: x.tolist() for name, x in zip("xy", function.nodes, strict=False)}
+        out = {"kind": "interpolation", **nodes, "values": function.values.tolist(), "outside": list(function.outside)}
         return out if function.error is None else out | {"error": function.error}
     if isinstance(function, Rotation) and function.eop is None:
         return {"kind": "rotation", "from": function.from_, "to": function.to}
