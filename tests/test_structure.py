@@ -33,6 +33,7 @@ io loading
 evaluate
 study
 present
+determination
 __init__
 cli
 __main__

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from piazzi import earth, formats, orbit
+    from piazzi.determination.determining import determine
+    from piazzi.determination.result import Determination
+    from piazzi.determination.unknowns import Estimated
     from piazzi.earth import Epoch
     from piazzi.estimate.bank import Bank
     from piazzi.estimate.batch import BatchLeastSquares
@@ -113,6 +116,9 @@ _WHERE = {
         "piazzi.evaluate.window_trade": "WindowTrade",
         "piazzi.study": "Study read_store",
         "piazzi.present.report": "write_report",
+        "piazzi.determination.determining": "determine",
+        "piazzi.determination.result": "Determination",
+        "piazzi.determination.unknowns": "Estimated",
         "": "earth formats orbit",
     }.items()
     for name in names.split()
@@ -120,16 +126,16 @@ _WHERE = {
 
 __version__ = "0.1.0"
 __all__ = [
-    "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Discrete", "DormandPrince",
-    "DormandPrince5", "Ephemeris", "Epoch", "Estimate", "Euler", "ExtendedKalmanFilter", "FactorGraph", "Forecast",
-    "Function", "GaussJackson", "Gaussian", "Heun", "Huber", "Integrator", "Interpolation", "Kepler", "LiveFilter",
-    "LiveRootFilter", "LiveWindow", "Manoeuvre", "Midpoint", "Model", "Observability", "Observations", "Parameter", "Pass",
-    "Prediction", "Problem", "ProcessNoise", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor",
-    "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station", "Study", "Table", "Taylor", "Tracking", "Truth",
-    "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps", "compare", "difference", "earth",
-    "formats", "kepler_transition", "load", "observability", "orbit", "passes", "predict", "propagate_kepler",
-    "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning", "substep_error", "update", "windows",
-    "with_gauss_markov", "with_prior_at", "write_report",
+    "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Determination", "Discrete", "DormandPrince",
+    "DormandPrince5", "Ephemeris", "Epoch", "Estimate", "Estimated", "Euler", "ExtendedKalmanFilter", "FactorGraph",
+    "Forecast", "Function", "GaussJackson", "Gaussian", "Heun", "Huber", "Integrator", "Interpolation", "Kepler",
+    "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre", "Midpoint", "Model", "Observability", "Observations",
+    "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8",
+    "Schedule", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station", "Study", "Table", "Taylor",
+    "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps", "compare",
+    "determine", "difference", "earth", "formats", "kepler_transition", "load", "observability", "orbit", "passes", "predict",
+    "propagate_kepler", "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning", "substep_error",
+    "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip
 
 

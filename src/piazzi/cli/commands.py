@@ -21,6 +21,7 @@ COMMANDS = (
     "observability",
     "report",
     "tracking",
+    "determine",
     "difference",
     "data",
 )
@@ -55,6 +56,7 @@ def piazzi() -> None:
     Examples:
       piazzi demo -o demo                       a first look: tables and pictures
       piazzi tracking pass.tdm                  what is in a file of tracking data
+      piazzi determine fixes.oem -o orbit.oem   an orbit from files of others
       piazzi estimate tracking.npz              the orbit, and how sure it is
       piazzi compare b612-range --with ekf --with graph
       piazzi windows tracking.npz               how long a window has to be

@@ -1,0 +1,73 @@
+"""What a solution leaves of the measurements, and what the measurements alone know of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from piazzi.determination.setup import Setup
+from piazzi.estimate.batch import undisturbed
+from piazzi.evaluate.information import NEGLIGIBLE, along, factor, predicted
+from piazzi.problem.checks import Array
+from piazzi.problem.inputs import prepare
+from piazzi.simulation import wrapped
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """Residuals at a solution and their derivatives.
+
+    Attributes
+    ----------
+    residual : (J, m), observed minus computed, SI; NaN where there is none
+    whitened : (J, m), the same in units of the noise, components of a row made independent
+    rows : (J, m, n), minus the derivatives of `whitened` by the first state and the constants
+    prior : (p, n), rows that the priors of the constants are worth
+    prior_miss : (p,), how far the solution is from those priors, in their sigmas
+    """
+
+    residual: Array
+    whitened: Array
+    rows: Array
+    prior: Array
+    prior_miss: Array
+
+    def information(self, keep: Array, scale: Array) -> Array:
+        """Root (n, n) of the information of the rows to keep (J,) and of priors of constants, in units of `scale`."""
+        n = self.rows.shape[2]
+        own = np.nan_to_num(self.rows[keep]).reshape(-1, n)
+        return factor(np.vstack([own, self.prior]) * scale)
+
+    def leverage(self, root: Array, scale: Array) -> Array:
+        """(J, m, m) whitened H P H^T of every row, with P the covariance that has this root of its information."""
+        solved = np.linalg.solve(root.T, (np.nan_to_num(self.rows).reshape(-1, len(scale)) * scale).T).T
+        blocks = solved.reshape(self.rows.shape)
+        return np.asarray(blocks @ np.swapaxes(blocks, 1, 2))
+
+    def step(self, keep: Array, root: Array, scale: Array) -> float:
+        """How far one more step of Gauss and Newton would go in the directions that are seen, in sigma of the solution."""
+        n = self.rows.shape[2]
+        whitened = np.nan_to_num(self.whitened[keep]).reshape(-1)
+        J = np.vstack([np.nan_to_num(self.rows[keep]).reshape(-1, n), self.prior]) * scale
+        gradient = J.T @ np.concatenate([whitened, self.prior_miss])
+        return float(np.linalg.norm(np.linalg.lstsq(root.T, gradient, rcond=NEGLIGIBLE)[0]))
+
+
+def analysed(given: Setup, states: Array) -> Analysis:
+    """Of states (K, n) at all epochs, as one orbit without process noise."""
+    problem = given.problem if given.problem.is_noise_free else undisturbed(given.problem)
+    inputs = prepare(problem, given.tracking)
+    with np.errstate(all="ignore"):
+        shot = along(problem, inputs, states)
+        computed = predicted(problem, inputs, states)
+    J, m = inputs.z.shape
+    stations = given.tracking.stations_of(problem)
+    residual = wrapped(problem, stations, inputs.z - computed)
+    constants = len(problem.model.states)
+    sigma = np.sqrt(np.diag(problem.covariance))[constants:]
+    known = np.flatnonzero(sigma > 0)
+    prior = np.zeros((len(known), problem.model.n))
+    prior[np.arange(len(known)), constants + known] = 1.0 / sigma[known]
+    miss = (states[0, constants:] - problem.mean[constants:])[known] / sigma[known]
+    return Analysis(residual, shot.innovations, shot.rows.reshape(J, m, -1), prior, -miss)

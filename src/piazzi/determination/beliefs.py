@@ -1,0 +1,69 @@
+"""What an estimate says of the orbit at any date: from the epoch that is nearest before it, with the forces of the problem."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+
+import numpy as np
+
+from piazzi.determination.setup import Setup, follow
+from piazzi.earth import Epoch
+from piazzi.estimate.estimator import Estimate
+from piazzi.problem.checks import Array
+
+
+def beliefs(given: Setup, estimate: Estimate, epochs: Sequence[Epoch], factor: float = 1.0) -> tuple[Array, Array]:
+    """States (K, 6) of the GCRF and covariances (K, 6, 6), these times the square of `factor`.
+
+    Raises
+    ------
+    ValueError
+        Where the orbit ends on the way.
+    """
+    t = np.array([epoch - given.measured.epoch for epoch in epochs])
+    mean, P = np.empty((len(t), given.problem.model.n)), np.empty((len(t), *estimate.covariance.shape[1:]))
+    nodes = estimate.times
+    base = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, len(nodes) - 1)
+    if given.problem.is_noise_free and estimate.view == "delayed" and len(t) > 1:
+        base[:] = base.min()  # one orbit: the first of them serves all
+    for k in np.unique(base):
+        own = np.flatnonzero(base == k)
+        mean[own], P[own] = _from(given, estimate, int(k), t[own])
+    return mean[:, :6], P[:, :6, :6] * factor**2
+
+
+def _from(given: Setup, estimate: Estimate, k: int, t: Array) -> tuple[Array, Array]:
+    """Beliefs at times, from that at epoch k; process noise counts behind the last one."""
+    start, x, P = float(estimate.times[k]), estimate.mean[k], estimate.covariance[k]
+    if not given.problem.is_noise_free and k == len(estimate.times) - 1 and (t > start).all():
+        order = np.argsort(t, kind="stable")
+        found = estimate.predict(t[order])
+        back = np.argsort(order, kind="stable")
+        return found.mean[back], found.covariance[back]
+    out, cov = np.empty((len(t), len(x))), np.empty((len(t), *P.shape))
+    for side in (t >= start, t < start):
+        if side.any():
+            out[side], cov[side] = _carried(given, start, x, P, t[side])
+    return out, cov
+
+
+def _carried(given: Setup, start: float, x: Array, P: Array, t: Array) -> tuple[Array, Array]:
+    """By transition matrices, forwards or backwards."""
+    step = given.chosen.max_step
+    order = np.unique(t) if t[0] >= start else np.unique(t)[::-1]
+    nodes, marks = [start], []
+    for when in order.tolist():
+        if when != nodes[-1]:
+            parts = 1 if when > nodes[-1] else ceil((nodes[-1] - when) / step)
+            nodes += np.linspace(nodes[-1], when, parts + 1)[1:].tolist()
+        marks.append(len(nodes) - 1)
+    states, Phi = follow(given.problem, np.array(nodes), x, step)
+    total, now = {0: np.eye(len(x))}, np.eye(len(x))
+    for i, one in enumerate(Phi, start=1):
+        now = one @ now
+        total[i] = now
+    where = np.searchsorted(order if t[0] >= start else -order, t if t[0] >= start else -t)
+    at = [marks[i] for i in where]
+    W = np.stack([total[i] for i in at])
+    return states[at], W @ P @ np.swapaxes(W, 1, 2)

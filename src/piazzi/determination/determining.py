@@ -1,0 +1,185 @@
+"""`determine`: tracking in, an orbit with a tested covariance and a verdict out."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from piazzi.determination.analysis import Analysis, analysed
+from piazzi.determination.fit import estimate, estimators
+from piazzi.determination.guesses import Guess, from_fixes, guess_of
+from piazzi.determination.orbit_forces import chosen_forces
+from piazzi.determination.result import Determination
+from piazzi.determination.sensing import Measured, measured, of_object
+from piazzi.determination.setup import Setup, setup
+from piazzi.determination.unknowns import considered, estimated
+from piazzi.determination.verdict import verdict
+from piazzi.earth import Epoch
+from piazzi.earth.dates import read_date
+from piazzi.earth.rotation import frame_named
+from piazzi.estimate.estimator import Estimate, Estimator
+from piazzi.formats import Observations, concatenate, read_tracking
+
+SOURCES = (str, os.PathLike)
+
+
+def determine(
+    *tracking: Any,
+    guess: Any = None,
+    stations: Any = None,
+    with_: Any = None,
+    forces: Any = "default",
+    estimate: Any = (),
+    consider: Any = (),
+    mass: float | None = None,
+    area: float | None = None,
+    com: float | None = None,
+    epoch: Any = None,
+    frame: str | None = None,
+    object: str | None = None,  # noqa: A002  # as everywhere
+    announce: Callable[[str], None] | None = None,
+    notes: Mapping[str, Any] | None = None,
+    **conventions: Any,
+) -> Determination:
+    """Determine the orbit of one object from its tracking.
+
+    Parameters
+    ----------
+    tracking : files, or `Observations`, put together
+    guess : where to begin: text, ``"a=7078km e=0.001 i=98.2deg raan=10deg argp=0deg nu=0deg epoch=2026-11-03T04:12:00Z"``
+        or ``"x=7000km ... vz=7.5km/s epoch=..."``; a file (OEM, OPM, TLE, OMM, SP3, CPF, an earlier determination's JSON); a
+        `Guess`.  Fixes of position need none.
+    stations : files, `earth.Station` objects or a `StationList`; "ilrs" are those of the package
+    with_ : estimators, as the command line writes them; the first is the answer.  Default the graph.
+    forces : "default" (by height), "none", text such as ``"gravity=EGM2008 degree=40 drag=exponential"``, or `earth.Forces`
+    estimate, consider : further unknowns, ``"cr"``, and constants that are uncertain, ``{"cr": 0.1}``
+    mass, area, com : kg, m2; and what a range is shorter by than to the centre of mass, m
+    epoch : where the answer stands; default the last measurement
+    frame : axes of the answer, default GCRF; and of fixes whose file does not say them
+    object : name of what to determine, in files of several
+    announce : called with the name of each step as it begins
+    notes : kept in the result: the command
+    conventions : what the files do not say, as `read_tracking` takes it: ``range="two-way"``, ``sigma=["range.BER=10m"]``
+
+    Raises
+    ------
+    OSError
+        Where a file cannot be read.
+    ValueError
+        For what is wrong with the input or open, with the option that says it.
+    """
+    say = announce or (lambda step: None)
+    chosen = estimators(with_)
+    scale, _ = _instant(epoch)
+    axes = frame_named(frame) if frame else "GCRF"
+    say("reading")
+    given = prepared(
+        *tracking, guess=guess, stations=stations, forces=forces, estimate=estimate, consider=consider, mass=mass, area=area,
+        com=com, epoch=epoch, frame=frame, object=object, **conventions,
+    )  # fmt: skip
+    return solved(given, chosen, axes, scale, say, notes or {})
+
+
+def prepared(
+    *tracking: Any,
+    guess: Any = None,
+    stations: Any = None,
+    forces: Any = "default",
+    estimate: Any = (),
+    consider: Any = (),
+    mass: float | None = None,
+    area: float | None = None,
+    com: float | None = None,
+    epoch: Any = None,
+    frame: str | None = None,
+    object: str | None = None,  # noqa: A002
+    **conventions: Any,
+) -> Setup:
+    """The problem and tracking that `determine` solves, from the same words; raises as it does."""
+    _, at = _instant(epoch)
+    told = dict(conventions) | ({"frame": frame} if frame else {})
+    rows = of_object(_observations(tracking, told), object)
+    seen = measured(rows, stations, com=com)
+    begin = _guess(guess, seen, object)
+    found = chosen_forces(forces, begin.state, name=seen.object, mass=mass, area=area)
+    return setup(seen, considered(estimated(found, estimate, seen), consider, seen), begin, at=at)
+
+
+def objects_in(tracking: Sequence[Any], frame: str | None, told: Mapping[str, Any]) -> list[str | None]:
+    """Names of all objects of files."""
+    return list(_observations(tracking, dict(told) | ({"frame": frame} if frame else {})).objects) or [None]
+
+
+def solved(
+    given: Setup,
+    chosen: Mapping[str, Estimator],
+    frame: str = "GCRF",
+    scale: str = "UTC",
+    announce: Callable[[str], None] = lambda step: None,
+    notes: Mapping[str, Any] | None = None,
+) -> Determination:
+    """The determination of a problem by estimators, of which the first is the answer."""
+    keep = np.ones(len(given.rows), dtype=np.bool_)
+    reasons = np.full(len(given.rows), "", dtype=np.object_)
+    found: dict[str, Estimate] = {}
+    started = time.perf_counter()
+    for name, estimator in chosen.items():
+        announce(name)
+        found[name] = estimate(given, estimator, keep)
+    seconds = time.perf_counter() - started
+    answer = next(iter(found))
+    announce("testing")
+    analysis = _analysis(given, found[answer])
+    sentences = verdict(given, answer, found, analysis, keep)
+    return Determination(given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}))
+
+
+def _analysis(given: Setup, answer: Estimate) -> Analysis | None:
+    """None where the estimate is not finite, or cannot be linearised."""
+    if not np.isfinite(answer.mean).all():
+        return None
+    found = analysed(given, answer.mean)
+    there = ~np.isnan(given.tracking.values)
+    return found if np.isfinite(found.whitened[there]).all() and np.isfinite(found.rows[there]).all() else None
+
+
+def _observations(tracking: Sequence[Any], told: Mapping[str, Any]) -> Observations:
+    if not tracking:
+        raise ValueError("there is no tracking: name a file")
+    paths = [t for t in tracking if isinstance(t, SOURCES)]
+    ready = [t for t in tracking if not isinstance(t, SOURCES)]
+    for one in ready:
+        if not isinstance(one, Observations):
+            raise ValueError(f"tracking is a file or Observations, not a {type(one).__name__}")
+    return concatenate([*([read_tracking(*paths, **told)] if paths else []), *ready])
+
+
+def _instant(epoch: Any) -> tuple[str, Epoch | None]:
+    """The scale to tell dates in, and where the answer stands."""
+    if epoch is None:
+        return "UTC", None
+    scale = read_date(epoch).scale if isinstance(epoch, str) else "UTC"
+    return scale, Epoch(epoch)
+
+
+def _guess(given: Any, seen: Measured, chosen: str | None) -> Guess:
+    """The user's, or what fixes give by themselves."""
+    if given is not None:
+        return guess_of(given, seen.first, chosen or seen.object or None)
+    wide = {s.name for s in seen.stations if s.sensor in ("position", "position_velocity")}
+    own = np.isin(seen.tracking.row_stations, list(wide)) & np.isfinite(seen.tracking.values[:, :3]).all(axis=1) if wide else []
+    found = from_fixes(seen.epoch, seen.tracking.row_times[own], seen.tracking.values[own, :3]) if np.any(own) else None
+    if found is None:
+        raise ValueError("these measurements give no orbit to begin from: say one with --guess, as elements, a state or a file")
+    return found
+
+
+def plain_command(words: Sequence[str]) -> str:
+    """The command as a shell takes it, on one line."""
+    quoted = [word if re.fullmatch(r"[\w@%+=:,./~-]+", word) else "'" + word.replace("'", "'\\''") + "'" for word in words]
+    return " ".join(quoted)

@@ -1,0 +1,63 @@
+"""Estimators of a determination, each from the states of the guess."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from piazzi.determination.setup import Setup
+from piazzi.determination.words import seconds
+from piazzi.estimate.batch import BatchLeastSquares
+from piazzi.estimate.estimator import Estimate, Estimator
+from piazzi.estimate.factor_graph import FactorGraph
+from piazzi.estimate.registry import parse
+from piazzi.problem import Tracking
+from piazzi.problem.checks import Array
+
+DEFAULT = ("graph",)
+_WINDOW = re.compile(r"window:(\d+(?:\.\d+)?)(min|h|d)(x\d+)?(:.*)?", re.ASCII)
+
+
+def estimators(given: Any) -> dict[str, Estimator]:
+    """Estimators by the text that asked for them; a window's length may be in min, h or d.
+
+    Raises
+    ------
+    ValueError
+        For a name or an option that does not exist.
+    """
+    if given is None or (isinstance(given, (list, tuple)) and not given):
+        given = DEFAULT
+    if isinstance(given, Mapping):
+        return dict(given)
+    names: Iterable[Any] = [given] if isinstance(given, str) else given
+    return {str(name).strip(): parse(_in_seconds(str(name).strip())) for name in names}
+
+
+def _in_seconds(text: str) -> str:
+    match = _WINDOW.fullmatch(text)
+    if match is None:
+        return text
+    return f"window:{seconds(match[1] + match[2], 'window'):g}s{match[3] or ''}{match[4] or ''}"
+
+
+def estimate(given: Setup, estimator: Estimator, keep: Array) -> Estimate:
+    """The estimate from the rows to keep (J,), begun at the states of the guess where the estimator takes them."""
+    tracking = kept(given.tracking, keep)
+    if isinstance(estimator, FactorGraph) and estimator.start == "ekf":  # what a text without a start means
+        estimator = replace(estimator, start=given.states)
+    elif isinstance(estimator, BatchLeastSquares) and estimator.start is None:
+        estimator = replace(estimator, start=given.states[0])
+    return estimator.estimate(given.problem, tracking)
+
+
+def kept(tracking: Tracking, keep: Array) -> Tracking:
+    """The tracking with the values of the other rows missing."""
+    if keep.all():
+        return tracking
+    values = np.where(keep[:, None], tracking.values, np.nan)
+    return Tracking(tracking.row_times, values, tracking.row_stations, epoch=tracking.epoch)

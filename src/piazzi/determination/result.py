@@ -1,0 +1,166 @@
+"""`Determination`: an orbit, what it left of the measurements, and a verdict on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piazzi.determination.analysis import Analysis
+from piazzi.determination.beliefs import beliefs
+from piazzi.determination.orbit import Orbit
+from piazzi.determination.setup import Setup
+from piazzi.determination.verdict import DECISIVE, Sentence
+from piazzi.earth import Epoch
+from piazzi.estimate.estimator import Estimate
+from piazzi.problem import Problem, Tracking
+from piazzi.problem.checks import Array
+
+if TYPE_CHECKING:
+    import xarray
+    from rich.console import Console, ConsoleOptions, RenderResult
+
+
+@dataclass(frozen=True, eq=False)
+class Determination:
+    """Result of `determine`.
+
+    Attributes
+    ----------
+    setup : what was determined from, and with what
+    name, estimates : the estimator whose answer it is, and the estimates of all of them
+    keep : (J,), which rows of the tracking were used
+    reasons : (J,), why a row was not, "" where it was
+    analysis : residuals and derivatives at the answer, None where there is none
+    verdict : six sentences by name
+    scale : of the time in which `epoch` is told
+    frame : axes of the answer
+    seconds : of all estimators together
+    notes : further facts, as a result tells them: options, files
+    """
+
+    setup: Setup
+    name: str
+    estimates: Mapping[str, Estimate]
+    keep: Array
+    reasons: Array
+    analysis: Analysis | None
+    verdict: Mapping[str, Sentence]
+    scale: str
+    frame: str
+    seconds: float
+    notes: Mapping[str, Any]
+
+    @property
+    def estimate(self) -> Estimate:
+        """That of the estimator whose answer it is."""
+        return self.estimates[self.name]
+
+    @property
+    def problem(self) -> Problem:
+        """An ordinary problem, for every other function of this package."""
+        return self.setup.problem
+
+    @property
+    def tracking(self) -> Tracking:
+        """Its tracking, of the rows that were used; the others are missing values."""
+        return self.estimate.tracking
+
+    @property
+    def object(self) -> str:
+        """Name of what was determined, "" where nobody says it."""
+        return self.setup.measured.object
+
+    @property
+    def epoch(self) -> Epoch:
+        """Where the answer stands."""
+        return self.setup.measured.epoch + float(self.setup.tracking.times[self.setup.solution])
+
+    @property
+    def success(self) -> bool:
+        """Whether the estimator ended well."""
+        return self.estimate.success
+
+    @property
+    def determined(self) -> bool:
+        """Whether it did, and the orbit is seen, alone and converged, as far as that was tested."""
+        return self.success and all(self.verdict[key].ok is not False for key in DECISIVE)
+
+    @property
+    def message(self) -> str:
+        """What the estimator says, or which sentence of the verdict is false."""
+        wrong = [s.sentence for s in self.verdict.values() if s.ok is False]
+        return self.estimate.message or (wrong[0] if wrong else "")
+
+    @cached_property
+    def orbit(self) -> Orbit:
+        """The orbit in `frame`."""
+
+        def at(epochs: Sequence[Epoch]) -> tuple[Array, Array]:
+            return beliefs(self.setup, self.estimate, epochs)
+
+        return Orbit(self.epoch, self.frame, at)
+
+    @property
+    def modes(self) -> tuple[dict[str, Any], ...]:
+        """Orbits that fit, the most probable first: this one."""
+        state = self.orbit.at()
+        return ({"probability": 1.0, "mean": state.tolist(), "weighted_rms": self.weighted_rms},)
+
+    @property
+    def weighted_rms(self) -> float | None:
+        """Root mean square of the residuals in sigma, of rows that were used."""
+        if self.analysis is None:
+            return None
+        own = self.analysis.whitened[self.keep]
+        own = own[np.isfinite(own)]
+        return float(np.sqrt(np.mean(own**2))) if own.size else None
+
+    @cached_property
+    def residuals(self) -> xarray.Dataset:
+        """One entry a measurement: time, station, kind, observed, computed, o_minus_c, sigma, weight, used, reason."""
+        from piazzi.determination.residuals import dataset
+
+        return dataset(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object of schema piazzi.determine/1."""
+        from piazzi.determination.document import document
+
+        return document(self)
+
+    def write(self, path: Any, **options: Any) -> None:
+        """Write a product by the suffix of its name, whole or not at all: .oem .opm .ocm .tle .nc .csv .json .toml."""
+        from piazzi.determination.products import write
+
+        write(self, path, **options)
+
+    def report(self, path: Any) -> Any:
+        """Write a page; returns its path."""
+        from piazzi.determination.reporting import report
+
+        return report(self, path)
+
+    def ephemeris(self, span: Any = None, step: float | None = None, frame: str | None = None) -> Any:
+        """States and covariances over a span, an `Ephemeris`; default the rows that were used, to the solution."""
+        from piazzi.determination.products import ephemeris
+
+        return ephemeris(self, span, step, frame)
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        from piazzi.determination.showing import rich
+
+        yield from rich(self, console, options)
+
+    def __str__(self) -> str:
+        from piazzi.evaluate.grids import as_text
+
+        return as_text(self)
+
+    def _repr_html_(self) -> str:
+        from piazzi.determination.showing import html
+
+        return html(self)

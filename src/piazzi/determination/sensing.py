@@ -1,0 +1,197 @@
+"""Observations as what a problem takes: sensors, stations with their noise, and a tracking that knows its observations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from piazzi.determination.fixes import fixes
+from piazzi.determination.parts import Part
+from piazzi.earth import Epoch
+from piazzi.formats import Observations
+from piazzi.model import Sensor
+from piazzi.problem import Station, Tracking
+from piazzi.problem.checks import Array
+
+MOST_SIGMAS = 200  # different noise matrices of one station and sensor; beyond, sigmas are rounded up to two digits
+# kinds of rows, and what makes parts of all rows of these kinds; who takes a kind takes it from all stations
+MAKERS: Mapping[tuple[str, ...], Callable[[Observations, Array, Any], Sequence[Part]]] = {
+    ("x", "y", "z", "vx", "vy", "vz"): fixes,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What was measured, as a problem takes it.
+
+    Attributes
+    ----------
+    observations : as they were read, of one object
+    object : its name, "" where nobody says it
+    sensors, stations, tracking : of a problem whose time zero is `epoch`
+    rows : (J, m), for each row of the tracking and component the index of the observation, -1 for none
+    labels : for each station of the problem, the name by which users know it
+    functions, parameters : that sensors need beside those of the forces: data, and numbers or beliefs with their roles
+    assumed, left_out : what was assumed; why, and how many rows are not in the tracking
+    """
+
+    observations: Observations
+    object: str
+    sensors: tuple[Sensor, ...]
+    stations: tuple[Station, ...]
+    tracking: Tracking
+    rows: Array
+    labels: Mapping[str, str]
+    epoch: Epoch
+    functions: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, tuple[str, Any]] = field(default_factory=dict)
+    assumed: tuple[str, ...] = ()
+    left_out: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def first(self) -> Epoch:
+        """When the first row was measured."""
+        return self.epoch + float(self.tracking.times[0])
+
+
+def measured(observations: Observations, stations: Any = None, *, com: float | None = None) -> Measured:
+    """Sensors, stations and tracking of observations of one object.
+
+    Raises
+    ------
+    ValueError
+        For what the files leave open (with the option that says it), kinds that cannot be used, or no rows.
+    """
+    everything = observations
+    _ask(everything)
+    usable = everything.measured & everything.used
+    left_out = dict(everything.left_out)
+    unused = int(np.count_nonzero(everything.measured & ~everything.used))
+    if unused:
+        left_out["rows that the file says are not to be used"] = unused
+    order = np.argsort(everything.t, kind="stable")
+    index = order[usable[order]]
+    if not len(index):
+        raise ValueError(f"{_where(everything)}there is no measurement to use")
+    sigma = everything.sigma[index]
+    if np.isnan(sigma).any():
+        kind = everything.kinds[everything.kind[index[np.isnan(sigma)][0]]]
+        raise ValueError(f"{_where(everything)}standard deviations of {kind}: say them with --sigma, as in --sigma {kind}=10m")
+    first = everything.epoch.whole + np.floor(everything.t[index[0]])
+    epoch = Epoch.at(float(first))
+    parts = _parts(everything, index, stations)
+    sensors, places, names, labels = _stations(parts)
+    times = np.concatenate([part.t for part in parts]) + (everything.epoch - epoch)
+    width = max(part.values.shape[1] for part in parts)
+    values = np.concatenate([_padded(part.values, width, np.nan) for part in parts])
+    rows = np.concatenate([_padded(part.rows, width, -1) for part in parts])
+    by_time = np.argsort(times, kind="stable")
+    tracking = Tracking(times[by_time], values[by_time], np.array(names)[by_time], epoch=epoch)
+    in_order = bool(np.all(everything.t[1:] >= everything.t[:-1]))
+    sorted_ = () if in_order else ("rows were out of order, and are sorted by time",)
+    known = everything.objects
+    return Measured(
+        everything, known[0] if known else "", sensors, places, tracking, rows[by_time], labels, epoch,
+        {name: value for part in parts for name, value in part.functions.items()},
+        {name: value for part in parts for name, value in part.parameters.items()},
+        tuple(dict.fromkeys([*everything.assumed, *sorted_, *(text for part in parts for text in part.assumed)])),
+        left_out,
+    )  # fmt: skip
+
+
+def of_object(observations: Observations, chosen: str | None) -> Observations:
+    """The rows of one object; raises ValueError with the list where there are several, or not that one."""
+    known = observations.objects
+    if chosen is None:
+        if len(known) > 1:
+            more = f" and {len(known) - 8} more" if len(known) > 8 else ""
+            raise ValueError(
+                f"{_where(observations)}{len(known)} objects, {', '.join(known[:8])}{more}: say which with --object, or --each"
+            )
+        return observations
+    if chosen not in known:
+        raise ValueError(f"{_where(observations)}no object {chosen!r}; there is {', '.join(known[:8]) or 'no name of any'}")
+    return observations[observations.object == observations.participants.index(chosen)]
+
+
+def _ask(observations: Observations) -> None:
+    """Raise ValueError for what is open."""
+    waiting = [text for text in observations.open if "--" in text]
+    if waiting:
+        more = f" (and {len(waiting) - 1} more: piazzi tracking lists them)" if len(waiting) > 1 else ""
+        raise ValueError(f"{_where(observations)}the file does not say {_plain(waiting[0])}{more}")
+
+
+def _plain(text: str) -> str:
+    return text[:1].lower() + text[1:] if not text[:2].isupper() else text
+
+
+def _where(observations: Observations) -> str:
+    return f"{observations.files[0]}: " if observations.files else ""
+
+
+def _parts(observations: Observations, index: Array, stations: Any) -> list[Part]:
+    """Parts of all rows, in the order of `MAKERS`; raises ValueError for kinds that none of them takes."""
+    found: list[Part] = []
+    kinds = observations.kind[index]
+    taken = np.zeros(len(index), dtype=np.bool_)
+    for names, maker in MAKERS.items():
+        own = np.isin(kinds, [i for i, kind in enumerate(observations.kinds) if kind in names])
+        if own.any():
+            found += maker(observations, index[own], stations)
+            taken |= own
+    if not taken.all():
+        kind = observations.kinds[kinds[~taken][0]]
+        known = ", ".join(n for names in MAKERS for n in names)
+        raise ValueError(f"{_where(observations)}{kind} is not determined from yet; what is, is {known}")
+    return found
+
+
+def _padded(values: Array, width: int, blank: float) -> Array:
+    out = np.full((len(values), width), blank, dtype=values.dtype)
+    out[:, : values.shape[1]] = values
+    return out
+
+
+def _stations(parts: Sequence[Part]) -> tuple[tuple[Sensor, ...], tuple[Station, ...], list[str], dict[str, str]]:
+    """Sensors, stations of the problem (one for each sensor, place and noise), that of each row, what users call them."""
+    sensors: dict[str, Sensor] = {}
+    stations: list[Station] = []
+    labels: dict[str, str] = {}
+    names: list[str] = []
+    for part in parts:
+        sensors.setdefault(part.sensor.name, part.sensor)
+        noise, which = _noises(part.noise)
+        own = []
+        for R in noise:
+            name, i = part.station, 1
+            while name in labels:
+                i += 1
+                name = f"{part.station} ({i})"
+            labels[name] = part.station
+            own.append(name)
+            stations.append(Station(name, part.sensor.name, R, part.numbers, place=part.place))
+        names += [own[i] for i in which]
+    return tuple(sensors.values()), tuple(stations), names, labels
+
+
+def _noises(noise: Array) -> tuple[Array, Array]:
+    """The different matrices of (R, m, m), and which of them each row has."""
+    flat = noise.reshape(len(noise), -1)
+    different, which = np.unique(flat, axis=0, return_inverse=True)
+    if len(different) > MOST_SIGMAS:
+        sigma = np.sqrt(np.diagonal(noise, axis1=1, axis2=2))
+        size = 10.0 ** (np.floor(np.log10(sigma)) - 1.0)
+        rounded = np.ceil(sigma / size - 1e-9) * size
+        scale = rounded / sigma
+        rounder = noise * scale[:, :, None] * scale[:, None, :]
+        diagonal = np.zeros_like(noise)
+        place = np.arange(noise.shape[1])
+        diagonal[:, place, place] = rounded**2
+        alone = (noise == diagonal * (noise != 0)).all(axis=(1, 2))
+        flat = np.where(alone[:, None], diagonal.reshape(len(noise), -1), rounder.reshape(len(noise), -1))
+        different, which = np.unique(flat, axis=0, return_inverse=True)
+    return different.reshape(-1, *noise.shape[1:]), np.asarray(which).reshape(-1)

@@ -1,0 +1,146 @@
+"""The problem of a determination: forces, sensors and a prior that is as wide as a guess is uncertain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from piazzi.determination.guesses import Guess
+from piazzi.determination.orbit_forces import Chosen
+from piazzi.determination.sensing import Measured
+from piazzi.earth import Epoch
+from piazzi.kernels import RungeKutta8
+from piazzi.problem import Gaussian, Problem, Tracking
+from piazzi.problem.arcs import Steps, arc
+from piazzi.problem.checks import Array
+
+WIDE = 0.1  # of distance and speed: the sigma of a guess, which says where to begin and nothing else
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """A problem with its tracking, and which row of it is which of `measured`.
+
+    Attributes
+    ----------
+    problem, tracking : times are past `measured.epoch`
+    rows : (J, m), indices of the observations, -1 where there is none
+    states : (K, n), of the guess at all epochs, to begin from
+    solution : index of the epoch at which the answer stands
+    """
+
+    measured: Measured
+    chosen: Chosen
+    guess: Guess
+    problem: Problem
+    tracking: Tracking
+    rows: Array
+    states: Array
+    solution: int
+    assumed: tuple[str, ...]
+
+
+def setup(
+    measured: Measured,
+    chosen: Chosen,
+    guess: Guess,
+    *,
+    roles: Mapping[str, str] | None = None,
+    values: Mapping[str, Any] | None = None,
+    at: Epoch | None = None,
+) -> Setup:
+    """The problem that these make.
+
+    Parameters
+    ----------
+    measured, chosen, guess : what was measured, forces, where to begin
+    roles, values : of parameters, beside those of the forces or instead of them
+    at : when the answer is to stand; default the last row
+
+    Raises
+    ------
+    ValueError
+        Where they do not fit, or the guess cannot be followed to the measurements.
+    """
+    problem = _problem(measured, chosen, guess, roles or {}, values or {})
+    tracking, rows, solution = _with_epoch(measured, at)
+    times = tracking.times
+    begun = guess.epoch - measured.epoch
+    states = _followed(problem, begun, times, chosen.max_step)
+    mean = states[0, : len(problem.model.states)]
+    problem = replace(problem, prior=_prior(mean), prior_time=float(times[0]))
+    assumed = tuple(dict.fromkeys([*guess.assumed, *measured.assumed, *chosen.assumed]))
+    return Setup(measured, chosen, guess, problem, tracking, rows, states, solution, assumed)
+
+
+def _problem(measured: Measured, chosen: Chosen, guess: Guess, roles: Mapping[str, str], values: Mapping[str, Any]) -> Problem:
+    own = {name: role for name, (role, _) in measured.parameters.items()}
+    every = {**chosen.roles, **own, **roles}
+    numbers = {**chosen.values, **{name: value for name, (_, value) in measured.parameters.items()}, **values}
+    model = chosen.forces.model(measured.sensors, every, functions=measured.functions)
+    return Problem(
+        model,
+        _prior(guess.state),
+        stations=measured.stations,
+        parameters=numbers,
+        integrator=RungeKutta8(max_step=chosen.max_step),
+        functions={**chosen.forces.functions(measured.epoch), **measured.functions},
+        epoch=measured.epoch,
+        name=measured.object,
+    )
+
+
+def _prior(mean: Array) -> Gaussian:
+    distance, speed = np.linalg.norm(mean[:3]), np.linalg.norm(mean[3:6])
+    sigma = np.concatenate([np.full(3, WIDE * distance), np.full(3, WIDE * speed), np.zeros(len(mean) - 6)])
+    return Gaussian(mean, np.diag(sigma**2))
+
+
+def _with_epoch(measured: Measured, at: Epoch | None) -> tuple[Tracking, Array, int]:
+    """The tracking with an empty row where the answer is to stand, if there is none; and that epoch's index."""
+    tracking, rows = measured.tracking, measured.rows
+    if at is None:
+        return tracking, rows, len(tracking.times) - 1
+    t = at - measured.epoch
+    same = np.flatnonzero(np.abs(tracking.times - t) < 1e-9)
+    if len(same):
+        return tracking, rows, int(same[0])
+    place = int(np.searchsorted(tracking.row_times, t))
+    blank = np.full((1, tracking.values.shape[1]), np.nan)
+    values = np.insert(tracking.values, place, blank, axis=0)
+    names = np.insert(tracking.row_stations, place, measured.stations[0].name)
+    new = Tracking(np.insert(tracking.row_times, place, t), values, names, epoch=tracking.epoch)
+    return new, np.insert(rows, place, -1, axis=0), int(np.searchsorted(new.times, t))
+
+
+def _followed(problem: Problem, begun: float, times: Array, step: float) -> Array:
+    """States (K, n) at the times of the orbit that is at the prior mean when `begun`."""
+    first = problem.mean
+    gap = float(times[0]) - begun
+    if gap:
+        nodes = np.linspace(begun, float(times[0]), max(ceil(abs(gap) / step), 1) + 1)
+        first = follow(problem, nodes, first, step)[0][-1]
+    return follow(problem, times, first, step)[0]
+
+
+def follow(problem: Problem, times: Array, first: Array, step: float) -> tuple[Array, Array]:
+    """States (K, n) and transition matrices (K - 1, n, n) at times that increase, or decrease by no more than a step each.
+
+    Raises
+    ------
+    ValueError
+        Where the orbit ends on its way, as at the centre of the Earth.
+    """
+    if len(times) == 1:
+        return first[None, :].copy(), np.empty((0, len(first), len(first)))
+    problem.cover(float(min(times[0], times[-1])), float(max(times[0], times[-1])))
+    with np.errstate(all="ignore"):
+        found = arc(problem, np.ascontiguousarray(times), np.asarray(first), Steps(step), derivative=True)
+    lost = np.flatnonzero(~np.isfinite(found.x).all(axis=1))
+    if len(lost):
+        raise ValueError(f"the guess cannot be followed beyond {problem.epoch + float(times[lost[0]])}: it leaves every orbit")
+    return found.x, found.Phi

@@ -1,0 +1,161 @@
+"""A determination for people: the verdict, the orbit, its elements, residuals and what was assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piazzi.determination.document import document
+from piazzi.determination.setup import Setup
+from piazzi.evaluate.grids import Grid, as_html, as_rich
+from piazzi.evaluate.quantities import display_of, number, with_sigma
+from piazzi.text import printable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rich.console import Console, ConsoleOptions
+
+MOST_REJECTED = 12
+
+
+def rich(found: Any, console: Console, options: ConsoleOptions) -> Iterable[Any]:
+    """Sentences first, then tables."""
+    from rich.text import Text
+
+    facts = document(found)
+    for line in heading(found, facts):
+        yield Text(printable(line))
+    yield from as_rich(grids(found, facts), [printable(line) for line in remarks(facts)], console, options)
+
+
+def html(found: Any) -> str:
+    """The same for a notebook."""
+    facts = document(found)
+    return as_html(grids(found, facts), [*heading(found, facts), *remarks(facts)])
+
+
+def heading(found: Any, facts: dict[str, Any]) -> Iterator[str]:
+    """What was determined, and the six sentences, those that are false first."""
+    state = "determined" if facts["determined"] else "not determined"
+    span = facts["span"]
+    yield f"{facts['object'] or 'the object'}: {state} by {found.name} from {span['first']} to {span['last']}"
+    sentences = sorted(facts["verdict"].values(), key=lambda one: one["ok"] is not False)
+    yield from (f"  {one['sentence']}" for one in sentences)
+
+
+def grids(found: Any, facts: dict[str, Any]) -> list[Grid]:
+    """State, elements, residuals, rejected rows."""
+    tables = [_state(facts), *([_elements(facts)] if facts["elements"] else []), _residuals(facts)]
+    return [
+        *tables,
+        *([_rejected(facts)] if facts["rejected"] else []),
+        *([_estimators(found)] if len(found.estimates) > 1 else []),
+    ]
+
+
+def _state(facts: dict[str, Any]) -> Grid:
+    rows = []
+    for name, unit, *numbers in zip(*(facts[k] for k in ("names", "units", "mean", "sigma")), strict=True):
+        value, sigma = (np.nan if v is None else v for v in numbers)
+        show = display_of(unit, [value])
+        rows.append((name, *with_sigma(value * show.factor, sigma * show.factor), show.unit))
+    return Grid(f"State at {facts['epoch']}, {facts['frame']}", ("", "value", "sigma", "unit"), tuple(rows))
+
+
+def _elements(facts: dict[str, Any]) -> Grid:
+    elements, rows = facts["elements"], []
+    for name, unit, value, sigma in zip(*(elements[k] for k in ("names", "units", "mean", "sigma")), strict=True):
+        show = display_of(unit, [value])
+        texts = with_sigma(value * show.factor, np.nan if sigma is None else sigma * show.factor)
+        rows.append((name, texts[0], "-" if sigma is None else texts[1], show.unit))
+    return Grid(f"Elements, {elements['frame']}", ("", "value", "sigma", "unit"), tuple(rows))
+
+
+def _residuals(facts: dict[str, Any]) -> Grid:
+    rows = []
+    for one in facts["residuals"]:
+        show = display_of(one["unit"], [one["rms"]])
+        values = [None if one[k] is None else one[k] * show.factor for k in ("mean", "rms")]
+        rows.append((
+            one["station"], one["component"], f"{one['used']}/{one['count']}", *(number(v, 3) for v in values), show.unit,
+            number(one["weighted_rms"], 3),
+        ))  # fmt: skip
+    return Grid(
+        "Residuals, observed minus computed",
+        ("station", "component", "used", "mean", "rms", "unit", "rms\n[sigma]"),
+        tuple(rows),
+        2,
+    )
+
+
+def _rejected(facts: dict[str, Any]) -> Grid:
+    shown, many = facts["rejected"][:MOST_REJECTED], len(facts["rejected"])
+    rows = []
+    for one in shown:
+        off = None if one["residual"] is None or not one["sigma"] else one["residual"] / one["sigma"]
+        rows.append((one["time"], one["station"], one["component"], number(off, 3), one["reason"]))
+    more = f", the first {MOST_REJECTED}" if many > MOST_REJECTED else ""
+    return Grid(
+        f"Not used: {many} measurements{more}", ("time", "station", "component", "residual\n[sigma]", "why"), tuple(rows), 3
+    )
+
+
+def _estimators(found: Any) -> Grid:
+    k, answer = found.setup.solution, found.estimate
+    sigma = np.sqrt(np.maximum(np.diag(answer.covariance[k])[:6], 0.0))
+    rows = []
+    for name, one in found.estimates.items():
+        with np.errstate(all="ignore"):
+            off = float(np.max(np.abs(one.mean[k, :6] - answer.mean[k, :6]) / sigma))
+        rows.append((name, "yes" if one.success else "no", str(one.iterations), number(off, 3), one.message))
+    return Grid("Estimators", ("", "success", "iterations", "apart\n[sigma]", "message"), tuple(rows))
+
+
+def remarks(facts: dict[str, Any]) -> Iterator[str]:
+    """Forces, constants, what was left out and what was assumed."""
+    forces = facts["forces"]
+    extra = [k for k in ("relativity", "radiation", "drag") if forces[k]]
+    field = f"{forces['gravity']} to degree {forces['degree']}" if forces["degree"] else "the Earth as a point"
+    names = [field, *forces["bodies"], *(f"{t} tides" for t in forces["tides"]), *extra, *forces["empirical"]]
+    yield f"Forces ({forces['source']}): {', '.join(names)}."
+    for what, count in facts["left_out"].items():
+        yield f"Left out: {what}{f' ({count:,})' if isinstance(count, int) else f': {count}'}."
+    for text in facts["assumed"]:
+        yield f"Assumed: {text}."
+
+
+def line(found: Any) -> str:
+    """One line on an object."""
+    facts = document(found)
+    state = "determined" if facts["determined"] else "not determined"
+    rms = found.weighted_rms
+    wrong = [one["sentence"] for one in facts["verdict"].values() if one["ok"] is False]
+    said = f": {wrong[0]}" if wrong else ""
+    return printable(f"{facts['object'] or 'the object'}: {state}, residuals {number(rms, 3)} sigma{said}")
+
+
+def shown(given: Setup) -> str:
+    """Forces, unknowns, noise and assumptions of a problem that is not solved yet."""
+    problem, chosen, measured = given.problem, given.chosen, given.measured
+    facts = {"forces": chosen.facts, "left_out": {**chosen.left_out, **measured.left_out}, "assumed": given.assumed}
+    lines = [f"{measured.object or 'the object'}: {len(given.tracking.times):,} epochs from {measured.first}"]
+    lines += [
+        f"Begins at {given.guess.epoch} from {given.guess.source}: {', '.join(f'{v:.6g}' for v in given.guess.state)} (m, m/s)."
+    ]
+    lines += ["Unknowns:", "  position and velocity, which the guess leaves open"]
+    for name in problem.model.constants:
+        prior = problem.parameters[name]
+        lines.append(f"  {name}: {prior.mean[0]:.4g} +- {prior.covariance[0, 0] ** 0.5:.3g} {problem.model.unit(name)}")
+    lines += [f"Considered: {name}" for name in problem.considered]
+    lines.append("Noise:")
+    for station in problem.stations:
+        sensor = problem.model.sensor(station.sensor)
+        sigmas = ", ".join(
+            f"{c} {number(s, 3)} {u}"
+            for c, s, u in zip(sensor.components, np.sqrt(np.diag(station.noise)), dict(sensor.units).values(), strict=True)
+        )
+        lines.append(f"  {measured.labels[station.name]} ({station.sensor}): {sigmas}")
+    return "\n".join(printable(text) for text in [*lines, *remarks(facts)])

@@ -1,0 +1,190 @@
+"""Six sentences on a determination, each with the test behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from piazzi.determination.analysis import Analysis
+from piazzi.determination.setup import WIDE, Setup
+from piazzi.estimate.chi_square import quantile
+from piazzi.estimate.estimator import Estimate
+from piazzi.evaluate.information import singular
+from piazzi.evaluate.quantities import finite, number
+from piazzi.orbit import state_axes
+from piazzi.problem.checks import Array
+
+KEYS = ("seen", "alone", "converged", "honest", "agreed", "complete")
+DECISIVE = KEYS[:3]
+SURE = 0.999  # of the two-sided test of residuals
+NEAR, APART = 1.0, 3.0  # sigma, by which estimators of all measurements, and those of real time, may differ
+STILL = 1e-2  # sigma of a last step
+AXES = (
+    "radial position",
+    "along-track position",
+    "cross-track position",
+    "radial velocity",
+    "along-track velocity",
+    "cross-track velocity",
+)
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """Whether it is so (None: there was nothing to test with), the figure, how it was tested, and the words."""
+
+    ok: bool | None
+    figure: float | None
+    test: str
+    sentence: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {"ok": self.ok, "figure": finite(self.figure), "test": self.test, "sentence": self.sentence}
+
+
+def verdict(
+    given: Setup, name: str, estimates: Mapping[str, Estimate], analysis: Analysis | None, keep: Array
+) -> dict[str, Sentence]:
+    """The six of an answer, that of the first estimate."""
+    answer = estimates[name]
+    return dict(
+        zip(
+            KEYS,
+            (
+                seen(given, analysis, keep),
+                alone(given),
+                converged(given, answer, analysis, keep),
+                honest(given, analysis, keep),
+                agreed(given, name, estimates),
+                Sentence(None, None, "none yet", "Complete: what the forces leave out is not weighed against sigma yet."),
+            ),
+            strict=True,
+        )
+    )
+
+
+def scale_of(given: Setup) -> Array:
+    """Units of the first state (n,): the sigma of the guess, and of the priors of constants."""
+    sigma = np.sqrt(np.diag(given.problem.covariance))
+    return np.where(sigma > 0, sigma, 1.0)
+
+
+def seen(given: Setup, analysis: Analysis | None, keep: Array) -> Sentence:
+    """Whether the measurements alone determine the six values of the orbit."""
+    test = (
+        f"smallest singular value of the information without the prior, in units of {WIDE:.0%} of distance and speed, above 1"
+    )
+    if analysis is None:
+        return Sentence(None, None, test, "Seen: the fit gave no orbit to ask this of.")
+    scale = scale_of(given)
+    values, directions = singular(analysis.information(keep, scale))
+    smallest, weakest = float(values[-1]), directions[-1] * scale
+    many = int(np.isfinite(analysis.whitened[keep]).sum())
+    words = _direction(given.states[0], weakest)
+    if not smallest > 1.0:
+        blind = int((values <= 1.0).sum())
+        return Sentence(
+            False, smallest, test,
+            f"Not seen: {many} measurements leave {blind} of {len(values)} directions as open as the guess, "
+            f"the widest {words}.",
+        )  # fmt: skip
+    size = float(np.linalg.norm(weakest[:3]) / smallest)
+    return Sentence(
+        True, smallest, test,
+        f"Seen: {many} measurements alone determine the orbit, the widest direction, {words}, to {_metres(size)} at its start.",
+    )  # fmt: skip
+
+
+def _direction(state: Array, change: Array) -> str:
+    """The largest component of a change of state along the axes of the orbit, or of a constant."""
+    local = state_axes(state[:3], state[3:6]) @ change[:6]
+    share = np.abs(local) / np.repeat([np.linalg.norm(state[:3]), np.linalg.norm(state[3:6])], 3)
+    return AXES[int(np.argmax(share))] if np.isfinite(share).all() and share.any() else "a constant"
+
+
+def alone(given: Setup) -> Sentence:
+    """Whether another orbit gives the same measurements."""
+    test = "two fixes of position or more leave one orbit"
+    wide = [len(s.noise) >= 3 and s.sensor.startswith("position") for s in given.problem.stations]
+    fixed = np.array(wide)[given.tracking.stations_of(given.problem)] & np.isfinite(given.tracking.values).any(axis=1)
+    if np.unique(given.tracking.row_times[fixed]).size >= 2:
+        return Sentence(True, 0.0, test, "Alone: positions were measured directly, so no other orbit fits them.")
+    return Sentence(None, None, test, "Alone: twins were not looked for.")
+
+
+def converged(given: Setup, answer: Estimate, analysis: Analysis | None, keep: Array) -> Sentence:
+    """Whether another step would go nowhere, and the estimator ended well."""
+    test = f"the estimator's own criterion, and a last step below {STILL:g} sigma"
+    if not answer.success:
+        return Sentence(False, None, test, f"Not converged: {answer.message}.")
+    if analysis is None or answer.view != "delayed" or not given.problem.is_noise_free or "weights" in answer.details:
+        return Sentence(True, None, test, f"Converged: the estimator ended after {_count(answer.iterations, 'iteration')}.")
+    scale = scale_of(given)
+    left = analysis.step(keep, analysis.information(keep, scale), scale)
+    if not left <= STILL:
+        return Sentence(False, left, test, f"Not converged: another step would go {number(left, 2)} sigma.")
+    return Sentence(
+        True,
+        left,
+        test,
+        f"Converged: after {_count(answer.iterations, 'iteration')} another step would go {number(left, 1)} sigma.",
+    )
+
+
+def honest(given: Setup, analysis: Analysis | None, keep: Array) -> Sentence:
+    """Whether residuals are as large as their sigmas say."""
+    test = f"sum of squared residuals in sigma against chi-square at {SURE:.1%}"
+    if analysis is None:
+        return Sentence(None, None, test, "Honest: there are no residuals to judge by.")
+    whitened = analysis.whitened[keep]
+    squares = whitened[np.isfinite(whitened)] ** 2
+    free = len(squares) - given.problem.model.n + len(analysis.prior_miss)
+    if free < 1:
+        return Sentence(None, None, test, "Honest: there are no more measurements than unknowns, so sigmas cannot be tested.")
+    total = float(squares.sum() + (analysis.prior_miss**2).sum())
+    size = float(np.sqrt(total / free))
+    high, low = quantile(SURE, free), quantile(1.0 - SURE, free)
+    if total > high:
+        return Sentence(
+            False, size, test,
+            f"Not honest: residuals are {number(size, 3)} times as large as their sigmas say, "
+            "and so may be the errors of the orbit.",
+        )  # fmt: skip
+    fits = f"residuals are {number(size, 3)} of their sigmas" if total < low else "residuals are as large as their sigmas say"
+    note = ": these are cautious" if total < low else ""
+    return Sentence(True, size, test, f"Honest: {fits}{note}.")
+
+
+def agreed(given: Setup, name: str, estimates: Mapping[str, Estimate]) -> Sentence:
+    """Whether the other estimators say the same."""
+    test = f"largest difference of a state in sigma: up to {NEAR:g} with all measurements, up to {APART:g} in real time"
+    others = {other: e for other, e in estimates.items() if other != name}
+    if not others:
+        return Sentence(None, None, test, "Agreed: only one estimator was asked; --with names more.")
+    k, answer = given.solution, estimates[name]
+    sigma = np.sqrt(np.maximum(np.diag(answer.covariance[k])[:6], 0.0))
+    apart: dict[str, float] = {}
+    wrong: list[str] = []
+    for other, estimate in others.items():
+        with np.errstate(all="ignore"):
+            off = float(np.max(np.abs(estimate.mean[k, :6] - answer.mean[k, :6]) / sigma))
+        apart[other] = off
+        limit = NEAR if estimate.view == "delayed" else APART
+        if not (estimate.success and off <= limit):
+            wrong.append(f"{other} {'failed' if not estimate.success else f'is {number(off, 2)} sigma off'}")
+    worst = max(apart.values(), key=lambda v: v if np.isfinite(v) else np.inf)
+    if wrong:
+        return Sentence(False, worst, test, f"Not agreed: {', '.join(wrong)}.")
+    return Sentence(True, worst, test, f"Agreed: {', '.join(others)} within {number(worst, 2)} sigma.")
+
+
+def _count(many: int, what: str) -> str:
+    return f"{many} {what}{'' if many == 1 else 's'}"
+
+
+def _metres(value: float) -> str:
+    return f"{number(value / 1e3, 2)} km" if value >= 1e3 else f"{number(value, 2)} m"

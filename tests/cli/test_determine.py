@@ -1,0 +1,104 @@
+"""`piazzi determine` as a program: what it prints, writes and refuses."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi.formats import Arc, Ephemeris, oem_text
+from tests.determination.fixing import EPOCH, truth
+
+T = np.arange(0.0, 43200.0, 900.0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A file of fixes with sigmas, and one with two objects."""
+    here = tmp_path_factory.mktemp("determine")
+    states = truth(T)
+    noise = np.random.default_rng(5).standard_normal((len(T), 3))
+    P = np.tile(np.diag([25.0] * 3 + [1e6] * 3), (len(T), 1, 1))
+    said = {"frame": "GCRF", "centre": "EARTH", "scale": "UTC", "covariance_t": T, "covariance": P}
+    said["covariance_frames"] = ("GCRF",) * len(T)
+    arcs = [
+        Arc(epoch=EPOCH, t=T, position=states[:, :3] + 5.0 * noise, velocity=states[:, 3:], name=name, **said)
+        for name in ("SAT", "OTHER")
+    ]
+    (here / "one.oem").write_text(oem_text(Ephemeris(arcs=(arcs[0],))))
+    (here / "two.oem").write_text(oem_text(Ephemeris(arcs=tuple(arcs))))
+    return here
+
+
+def program(folder, *arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "piazzi", "determine", *arguments], cwd=folder, capture_output=True, text=True, timeout=600
+    )
+
+
+def test_it_determines_and_writes(folder):
+    done = program(
+        folder, "one.oem", "-o", "next.oem", "-o", "rows.csv", "-o", "all.nc", "--span", "first .. last+1h", "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["schema"] == "piazzi.determine/1" and facts["determined"] is True and facts["object"] == "SAT"
+    arc = pz.read_ephemeris(folder / "next.oem").arcs[0]
+    assert arc.instant(len(arc) - 1) - EPOCH == pytest.approx(T[-1] + 3600.0)
+    assert len((folder / "rows.csv").read_text().splitlines()) == 1 + 6 * len(T)
+    import xarray
+
+    with xarray.open_dataset(folder / "all.nc", engine="h5netcdf") as data:
+        assert data.sizes["measurement"] == 6 * len(T)
+
+
+def test_what_is_printed_and_shown(folder):
+    done = program(folder, "one.oem")
+    assert done.returncode == 0 and "Seen:" in done.stdout and "Elements" in done.stdout
+    shown = program(folder, "one.oem", "--show")
+    assert shown.returncode == 0 and "Unknowns:" in shown.stdout and "cr_a_m" in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["two.oem"], "--object"),
+        (["two.oem", "--object", "NOBODY"], "no object 'NOBODY'"),
+        (["missing.oem"], "No such file"),
+        (["one.oem", "-o", "out.xyz"], "must end in"),
+        (["one.oem", "-o", "/proc/out.oem"], "/proc/out.oem"),
+        (["one.oem", "--with", "grpah"], "did you mean 'graph'"),
+        (["one.oem", "--epoch", "2016-02-13T16:00:00"], "no time scale"),
+        (["one.oem", "--guess", "a=-7 km e=0.1"], "'km' stands alone"),
+        (["one.oem", "--guess", "a=7078km e=0.1 x=1km epoch=2016-02-13Z"], "not both"),
+        (["one.oem", "--guess", "a=7078km e=0.1 i=1deg raan=0deg argp=0deg nu=0deg"], "of which date"),
+        (["one.oem", "--guess", "a=-7000km e=0.1 i=1deg raan=0deg argp=0deg nu=0deg epoch=2016-02-13Z"], "no orbit"),
+        (["one.oem", "--guess", "nowhere.tle"], "No such file"),
+        (["one.oem", "--forces", "gravty=EGM2008"], "did you mean 'gravity'"),
+        (["one.oem", "--span", "first"], "two ends"),
+        (["one.oem", "--estimate", "cd"], "no unknown"),
+        (["one.oem", "--mass", "-3"], "positive"),
+        (["one.oem", "--each", "-o", "out.oem"], "{object}"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(folder, arguments, says):
+    done = program(folder, *arguments)
+    assert done.returncode == 2
+    assert says in done.stderr and len(done.stderr.splitlines()) == 1 and "Traceback" not in done.stderr
+    assert not (folder / "out.oem").exists() and done.stdout == ""
+
+
+def test_help_shows_eight_options(folder):
+    short, long = program(folder, "--help").stdout, program(folder, "--help-all").stdout
+    for option in ("--guess", "--stations", "--with", "--forces", "--output", "--report", "--json", "--sigma"):
+        assert option in short
+    assert "--anyway" not in short and "--anyway" in long
+
+
+def test_each_object_has_its_line_and_file(folder):
+    done = program(folder, "two.oem", "--each", "-o", "{object}.opm")
+    assert done.returncode == 0, done.stderr
+    assert (folder / "SAT.opm").exists() and (folder / "OTHER.opm").exists()
+    assert done.stdout.count("determined") == 2
