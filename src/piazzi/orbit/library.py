@@ -9,14 +9,21 @@ from piazzi import kernels
 from piazzi.kernels import Discrete, KernelSpec
 from piazzi.model import Model, Sensor
 
+_ARCS = ("kepler", "kepler_arcs", "lambert", "lambert_paths", "gooding")
+
 
 @cache
-def _spec() -> KernelSpec:
+def _spec(*fragments: str) -> KernelSpec:
     """They depend on no model; the smallest one stands in its place."""
     nothing = Model(("s",), ("0",), (Sensor("any", ["0"]),), discrete=True)
-    return KernelSpec(nothing, Discrete().scheme, ("kepler", "kepler_arcs", "lambert", "lambert_paths", "gooding"), 1)
+    return KernelSpec(nothing, Discrete().scheme, fragments, 1)
 
 
 def orbit_library() -> SimpleNamespace:
     """Lambert's problem and Kepler's, of whole arrays."""
-    return kernels.load(_spec())
+    return kernels.load(_spec(*_ARCS))
+
+
+def fit_library() -> SimpleNamespace:
+    """Two-body orbits fitted to rows of tracking."""
+    return kernels.load(_spec("kepler", "two_body_fit"))
