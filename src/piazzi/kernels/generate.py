@@ -9,7 +9,7 @@ the factors of an update.  The functions:
 * ``remember(x)``, ``first_rows()``: the state at the start of a step, and its derivative; ``identity_rows()``
 * ``complete(R)``: R with the constants' rows below it
 * ``measure_into(sensor, t, x, p, s, at, out, row)``: h
-* ``innovate(sensor, t, x, p, s, at, z, row, nu, H, out)``: z - h, angles wrapped, and H
+* ``innovate(sensor, t, x, p, s, at, z, row, nu, H, out)``: z - h, angles wrapped and put on the sky, and H
 * ``measure_row(measured, row, t, x, p, out, at)``, ``innovate_row(measured, row, t, x, p, nu, H, out)``: of a row's station
 * ``measure_lanes(sensor, t, x, p, s, at, h)``, ``innovate_lanes(sensor, t, x, p, s, at, z, nu, H)``: the same of `LANES` runs
 """
@@ -27,7 +27,7 @@ from piazzi.kernels.printer import function, in_time
 from piazzi.kernels.steps import adaptive_source, axes_source, kepler_source, runge_kutta_source
 from piazzi.kernels.steps import inline_source as _inline
 from piazzi.kernels.tableaus import DORMAND_PRINCE_8
-from piazzi.model import Model
+from piazzi.model import Model, Sensor
 from piazzi.model.derivation import constant_acceleration_step, derive, derive_sensor
 
 if TYPE_CHECKING:
@@ -240,19 +240,23 @@ def _sensor_source(model: Model) -> str:
         measure += [f"    out[row + {i}] = " + (f"h{i}" if i < sensor.width else "nan") for i in range(model.width)]
         innovate += [guard, "    " + _unpack(seen + J.names, f"scalar_h{index}_H({call})")]
         for i, angle in enumerate(sensor.is_angle):
+            scale, put_on_sky = _on_sky(sensor, i, "z[row + {}]")
             difference = f"z[row + {i}] - h{i}"
             difference = f"wrap_angle({difference})" if angle else difference
-            innovate.append(f"    nu[out + {i}] = unless_missing(z[row + {i}], {difference})")
-            innovate.append(f"    store(H, (out + {i}) * {model.n}, {J.dense_row(i)})")
+            innovate += put_on_sky
+            innovate.append(f"    nu[out + {i}] = unless_missing(z[row + {i}], {scale}({difference}))")
+            innovate.append(f"    store(H, (out + {i}) * {model.n}, {scale}{J.dense_row(i)})")
         innovate += [f"    nu[out + {i}] = nan" for i in range(sensor.width, model.width)]
         measure_lanes += [guard, "    " + _unpack(seen, f"scalar_h{index}({call})")]
         measure_lanes.append(f"    store_packs(h, 0, vector({', '.join(seen)}), LANES)")
         innovate_lanes += [guard, "    " + _unpack(seen + J.names, f"scalar_h{index}_H({call})")]
         for i, angle in enumerate(sensor.is_angle):
+            scale, put_on_sky = _on_sky(sensor, i, "load_packs(z, {} * LANES, 1, LANES)[0]")
             difference = f"load_packs(z, {i} * LANES, 1, LANES)[0] - h{i}"
             difference = f"wrap_angle({difference})" if angle else difference
-            innovate_lanes.append(f"    store_packs(nu, {i} * LANES, vector({difference}), LANES)")
-            innovate_lanes.append(f"    store_packs(H, {i * model.n} * LANES, {J.dense_row(i)}, LANES)")
+            innovate_lanes += put_on_sky
+            innovate_lanes.append(f"    store_packs(nu, {i} * LANES, vector({scale}({difference})), LANES)")
+            innovate_lanes.append(f"    store_packs(H, {i * model.n} * LANES, {scale}{J.dense_row(i)}, LANES)")
     if not model.sensors:
         measure, innovate, measure_lanes, innovate_lanes = ["pass"], ["pass"], ["pass"], ["pass"]
     return (
@@ -264,6 +268,15 @@ def _sensor_source(model: Model) -> str:
         + _inline("measure_lanes(sensor, t, x, p, s, at, h)", *measure_lanes)
         + _inline("innovate_lanes(sensor, t, x, p, s, at, z, nu, H)", *innovate_lanes)
     )
+
+
+def _on_sky(sensor: Sensor, i: int, measured: str) -> tuple[str, list[str]]:
+    """The factor of a component's innovation, and the line that works it out: by what is measured, where it is."""
+    partner = sensor.circle[i]
+    if partner is None:
+        return "", []
+    z = measured.format(partner)
+    return f"scale{i}*", [f"    scale{i} = cos(choose(10.0, fabs({z}), {z}, h{partner}))"]
 
 
 def _of_row(function: str, rest: str) -> tuple[str, str]:

@@ -62,6 +62,9 @@ class Sensor:
         Values given by an equation they solve, such as a light time: ``root`` is zero at the solution, which Newton's method
         finds from ``start``; the root's own definitions may use it, and stay names like any other.  Process noise within
         an offset is left out.
+    on_sky : mapping of an angle to the angle that it is counted along a small circle of, such as
+        ``{"azimuth": "elevation"}``: its innovations, and so its noise, are on the sky, times the cosine of what is measured
+        of the other.
 
     Raises
     ------
@@ -77,6 +80,7 @@ class Sensor:
     definitions: Any = field(default_factory=dict)
     visible: Any = field(default=(), repr=False)  # no kernel, and no checkpoint, depends on it
     roots: Any = ()
+    on_sky: Any = ()
     components: tuple[str, ...] = field(init=False)
 
     if TYPE_CHECKING:  # what is taken; the fields above say what is kept of it
@@ -91,6 +95,7 @@ class Sensor:
             definitions: Mapping[Any, Any] | Sequence[Any] = (),
             visible: Sequence[Any] = (),
             roots: Mapping[str, Mapping[str, Any]] | Sequence[Any] = (),
+            on_sky: Mapping[str, str] | Sequence[tuple[str, str]] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -110,10 +115,15 @@ class Sensor:
         put(self, "equations", tuple(labelled.values()))
         units = dict(self.units)
         known = ", ".join(labelled)
-        for what, given in (("angles", self.angles), ("units", units)):
+        put(self, "on_sky", tuple((str(a), str(b)) for a, b in dict(self.on_sky).items()))
+        on_sky = tuple(name for pair in self.on_sky for name in pair)
+        for what, given in (("angles", self.angles), ("units", units), ("on_sky", on_sky)):
             for component in given:
                 if component not in labelled:
                     raise ValueError(f"sensor {self.name!r}: {what} names {component!r}; its components are {known}")
+        for name in on_sky:
+            if name not in self.angles:
+                raise ValueError(f"sensor {self.name!r}: on_sky names {name!r}, which is not among its angles")
         for name in dict(self.number_units):
             if name not in self.free_names:
                 raise ValueError(f"sensor {self.name!r}: number_units names {name!r}, which no equation uses")
@@ -146,6 +156,12 @@ class Sensor:
     def is_angle(self) -> tuple[bool, ...]:
         """For every component, whether it is an angle."""
         return tuple(c in self.angles for c in self.components)
+
+    @cached_property
+    def circle(self) -> tuple[int | None, ...]:
+        """For every component, the number of the one whose cosine puts it on the sky."""
+        partner = dict(self.on_sky)
+        return tuple(self.components.index(partner[c]) if c in partner else None for c in self.components)
 
     @cached_property
     def free_names(self) -> frozenset[str]:

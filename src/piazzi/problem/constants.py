@@ -79,7 +79,7 @@ def _extended(model: Model, sensor: Sensor, station: Station, names: Mapping[str
     left = {name: unit for name, unit in units.items() if name not in names}
     definitions = tuple(_with_names(d, names) for d in sensor.definitions)
     visible = [_renamed(rule, names) for rule in sensor.visible]
-    copy = Sensor(label, equations, sensor.angles, dict(sensor.units), left, definitions, visible)
+    copy = Sensor(label, equations, sensor.angles, dict(sensor.units), left, definitions, visible, (), sensor.on_sky)
     return replace(model, parameters=(*model.parameters, *constants), sensors=(*model.sensors, copy))
 
 

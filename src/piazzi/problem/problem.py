@@ -412,7 +412,8 @@ class Problem:
     @property
     def runs_in_ensemble(self) -> bool:
         """Whether whole runs can advance together: where states can, with process noise that does not depend on them."""
-        return self.moves_in_lanes and not self.noise_varies
+        on_sky = any(sensor.on_sky for sensor in self.model.sensors)  # their noise depends on the state
+        return self.moves_in_lanes and not self.noise_varies and not on_sky
 
     def intervals(self, times: Array) -> tuple[float, Array, Array]:
         """Time of the prior, and for each epoch the substeps and the noise scale of the interval that ends there."""

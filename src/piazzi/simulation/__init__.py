@@ -122,7 +122,8 @@ def propagate(
         library.run_simulation(run, p, measured, first, w, np.empty((n, n)), states)
     check_finite(problem, epochs, first, states)
     if v is not None:
-        z += np.einsum("jab,jb->ja", np.linalg.cholesky(problem.station_noise)[row_station], v)
+        noise = np.einsum("jab,jb->ja", np.linalg.cholesky(problem.station_noise)[row_station], v)
+        z += noise / on_sky(problem, row_station, z)
     return states, wrapped(problem, row_station, z)
 
 
@@ -193,6 +194,16 @@ def check_times(times: Any) -> Array:
         k = int(down[0]) + 1
         raise ValueError(f"times must increase: time {k} is {out[k]:g} s, after {out[k - 1]:g} s")
     check_span(out[0], out[-1], f"time {len(out) - 1}")
+    return out
+
+
+def on_sky(problem: Problem, row_station: Array, z: Array) -> Array:
+    """What innovations of the measurements (J, M) are multiplied by, 1 but for angles that are on the sky."""
+    out = np.ones(z.shape)
+    for s, station in enumerate(problem.stations):
+        for i, partner in enumerate(problem.model.sensor(station.sensor).circle):
+            if partner is not None:
+                out[row_station == s, i] = np.cos(z[row_station == s, partner])
     return out
 
 

@@ -3,8 +3,9 @@
 States are those of `Forces`: x, y, z (m) and vx, vy, vz (m/s) on the axes of the GCRF.
 """
 
+from piazzi.earth.sensors.directions import azimuth_elevation, right_ascension_declination
 from piazzi.earth.sensors.instrument import Instrument
 from piazzi.earth.sensors.position import position
 from piazzi.earth.sensors.ranging import range  # noqa: A004
 
-__all__ = ["Instrument", "position", "range"]
+__all__ = ["Instrument", "azimuth_elevation", "position", "range", "right_ascension_declination"]

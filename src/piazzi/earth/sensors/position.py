@@ -67,8 +67,8 @@ def position(
         numbers |= own
         roles |= needs
     units = {component: "m" if component.startswith("position") else "m/s" for component in equations}
-    given: tuple[Any, ...] = (name, equations, (), units, {}, definitions, (), ())
-    return Instrument(*given, *with_parameters(numbers, roles, parameters), makers)
+    numbers, roles = with_parameters(numbers, roles, parameters)
+    return Instrument(name, equations, (), units, definitions=definitions, defaults=numbers, roles=roles, makers=makers)
 
 
 def _turned(
@@ -79,7 +79,7 @@ def _turned(
     makers: dict[str, Any] = {}
     turn = "fixed" if frame == "ITRF" else f"to_{frame.lower()}"
     if frame != "ITRF":  # that turn is the forces' own
-        makers[turn] = _Turn(frame)
+        makers[turn] = Turn(frame)
     if velocity:
         makers[f"spin_{frame.lower()}"] = _Spin(frame)
         text[names("spin")] = f"spin_{frame.lower()}({instant})"
@@ -101,7 +101,7 @@ def _lever(place: Sequence[str], speed: Sequence[str]) -> dict[str, str]:
     return text | {f"arm_v{a}": f"(n_{b}*arm_{c} - n_{c}*arm_{b})/n_r2" for a, b, c in ("xyz", "yzx", "zxy")}
 
 
-class _Turn:
+class Turn:
     """Makes the rotation from GCRF."""
 
     def __init__(self, frame: str) -> None:
@@ -111,6 +111,6 @@ class _Turn:
         return Rotation("GCRF", self.frame, epoch, eop)
 
 
-class _Spin(_Turn):
+class _Spin(Turn):
     def __call__(self, epoch: Any, eop: Any) -> Any:
         return Spin(self.frame, epoch, eop)

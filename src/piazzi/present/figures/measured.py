@@ -125,7 +125,7 @@ def residuals(ax: Axes, estimate: Estimate, column: int = 0, *, name: str = "est
 
 
 def residuals_of(estimate: Estimate) -> tuple[Array, Array]:
-    """z - h(mean) and the standard deviations of the noise, (J, m) each, NaN where there is no measurement."""
+    """z - h(mean), on the sky where the noise is, and the standard deviations of that, (J, m) each, NaN where nothing is."""
     problem, tracking = estimate.problem, estimate.tracking
     z = tracking.padded(problem.model.width)
     left, sigma = np.full(z.shape, np.nan), np.full(z.shape, np.nan)
@@ -140,6 +140,10 @@ def residuals_of(estimate: Estimate) -> tuple[Array, Array]:
         for i, component in enumerate(sensor.components):
             if component in sensor.angles:
                 difference[:, i] = np.pi - np.mod(np.pi - difference[:, i], 2 * np.pi)
+        for i, partner in enumerate(sensor.circle):
+            if partner is not None:
+                beside = z[rows, partner]
+                difference[:, i] *= np.cos(np.where(np.isnan(beside), h[:, partner], beside))
         left[rows, : sensor.width] = difference
         sigma[rows, : sensor.width] = np.sqrt(np.diagonal(station.noise))
     return left, np.where(np.isnan(left), np.nan, sigma)
