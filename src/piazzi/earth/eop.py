@@ -212,7 +212,7 @@ def _table(values: Array, path: Path, measured: float, dxdy_unit: float) -> EOPT
         raise ValueError(f"{path.name}: days must follow one another, at least four; after MJD {gap:g} one is missing")
     ut1_tai = values[:, 3] - scales.tai_utc(mjd, np.zeros_like(mjd))
     pole = values[:, [1, 2, 4, 5]] * ARCSEC * np.array([1.0, 1.0, dxdy_unit, dxdy_unit])
-    return EOPTable(mjd, ut1_tai, pole, path.name, measured)
+    return EOPTable(mjd, ut1_tai, pole, str(path), measured)
 
 
 def _c04(lines: list[bytes], path: Path) -> EOPTable:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,14 +16,14 @@ from piazzi.earth.gravity import Gravity
 from piazzi.earth.scales import Orientation
 from piazzi.earth.tabulated import Body, Rotation
 from piazzi.model import Model, Parameter, Sensor
+from piazzi.model.pruning import used_definitions
 from piazzi.text import nearest
 
 STATES = ("x", "y", "z", "vx", "vy", "vz")
 EMPIRICAL = ("radial", "along", "cross")
 _GROUPS = {"position": STATES[:3], "velocity": STATES[3:]}
 _UNITS = dict.fromkeys(STATES[:3], "m") | dict.fromkeys(STATES[3:], "m/s")
-_UNIT = {"cr_a_m": "m2/kg", "cd_a_m": "m2/kg", "air_density": "kg/m3", "air_height": "m", "air_scale": "m"}
-_WORD = re.compile(r"[A-Za-z]\w*")
+_UNIT = {"cr_a_m": "m^2/kg", "cd_a_m": "m^2/kg", "air_density": "kg/m^3", "air_height": "m", "air_scale": "m"}
 _ANY = Epoch.at(0.0)  # signatures are the same whatever the date
 
 
@@ -179,10 +178,10 @@ class Forces:
             STATES,
             dynamics,
             sensors,
-            [Parameter(name, role, _unit(name)) for name, role in every.items()],
+            [Parameter(name, role, unit_of(name)) for name, role in every.items()],
             _GROUPS,
             _UNITS,
-            definitions={**_used(self.definitions, texts), **(definitions or {})},
+            definitions={**used_definitions(self.definitions, texts), **(definitions or {})},
             functions={**self.functions(_ANY), **called, **(functions or {})},
         )
 
@@ -204,18 +203,6 @@ class Forces:
         }
 
 
-def _used(definitions: Mapping[str, str], texts: Iterable[str]) -> dict[str, str]:
-    """Those definitions whose values occur in the texts, or in a definition that does."""
-    known = {name: left for left in definitions for name in _WORD.findall(left)}
-    waiting = [word for text in texts for word in _WORD.findall(text)]
-    found: set[str] = set()
-    while waiting:
-        left = known.get(waiting.pop())
-        if left is not None and left not in found:
-            found.add(left)
-            waiting += _WORD.findall(definitions[left])
-    return {left: text for left, text in definitions.items() if left in found}
-
-
-def _unit(name: str) -> str:
-    return "m/s2" if name in EMPIRICAL else _UNIT.get(name, "")
+def unit_of(name: str) -> str:
+    """The unit of a parameter of forces, "" for none."""
+    return "m/s^2" if name in EMPIRICAL else _UNIT.get(name, "")

@@ -175,4 +175,5 @@ def _misfit(problem: Problem, tracking: Tracking) -> str:
 def _is_plain(truth: Truth) -> bool:
     """Whether a truth half says nothing."""
     nothing = (truth.state, truth.process_noise, truth.integrator, truth.manoeuvres)
-    return all(part is None for part in nothing) and not truth.parameters and truth.measurement_noise
+    other = truth.parameters or truth.dynamics or truth.definitions or truth.functions or truth.stations
+    return all(part is None for part in nothing) and not other and truth.measurement_noise

@@ -166,6 +166,14 @@ class Truth:
         None: the same, each with an error drawn from its covariance.
     accept : sequence of equations
         Which drawn first states count: those where each of these, of states and parameters, is above zero.
+    dynamics : mapping of state to equation
+        True rates of change that differ.
+    definitions : mapping of name to equation
+        Definitions that differ, or that those rates need.  Parameters that only the truth has are among `parameters`.
+    functions : mapping of name to function from outside
+        True data of functions that differ, or further functions.
+    stations : mapping of a station's name to numbers by name
+        True numbers of stations that differ.
     """
 
     state: Any = None
@@ -175,3 +183,7 @@ class Truth:
     measurement_noise: bool = True
     manoeuvres: Sequence[Manoeuvre] | None = None
     accept: Sequence[str] = ()
+    dynamics: Mapping[str, Any] = field(default_factory=dict)
+    definitions: Mapping[str, Any] = field(default_factory=dict)
+    functions: Mapping[str, Any] = field(default_factory=dict)
+    stations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)

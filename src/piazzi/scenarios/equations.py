@@ -14,13 +14,14 @@ from piazzi.model.definitions import name_of
 from piazzi.model.functions import AT, STATION
 from piazzi.problem.epochs import epoch_given
 from piazzi.problem.parts import Schedule
+from piazzi.scenarios.earth import definitions_of, dynamics_of, names_of
 from piazzi.scenarios.functions import read_functions
 from piazzi.scenarios.table import Table, joined, shown
 from piazzi.text import nearest
 from piazzi.units import ONE, Unit, Units, is_quantity
 
 if TYPE_CHECKING:
-    from piazzi.earth import Epoch
+    from piazzi.earth import Epoch, ForceChoice
 
 MAX_STATES = 100
 OWN = "; numbers of each station's own are named in the sensor's numbers"
@@ -30,6 +31,7 @@ OWN = "; numbers of each station's own are named in the sensor's numbers"
 class Physics:
     """What the equations' half says: the model, None where it is faulty, and the unit of every name.
 
+    `forces` are those of [earth]; `dynamics`, `definitions` and `functions` what the file has beside them.
     `defaults` are numbers in SI for stations of a sensor that give none, `schedules` those of stations without their own.
     """
 
@@ -43,8 +45,16 @@ class Physics:
     numbers: dict[str, dict[str, Unit]] = field(default_factory=dict)
     definitions: dict[str, str] = field(default_factory=dict)
     functions: dict[str, Any] = field(default_factory=dict)
+    forces: ForceChoice | None = None
+    dynamics: dict[str, str] = field(default_factory=dict)
     defaults: dict[str, dict[str, float]] = field(default_factory=dict)
     schedules: dict[str, Schedule | None] = field(default_factory=dict)
+
+    @property
+    def known(self) -> set[str]:
+        """Every name that has a value in equations of motion."""
+        own = {*self.units, *_names(self.definitions), TIME}
+        return own if self.forces is None else own | names_of(self.forces)
 
     @property
     def estimated(self) -> list[str]:
@@ -62,10 +72,10 @@ def shared(model: Model) -> Model:
     return model
 
 
-def read_physics(file: Table, units: Units, epoch: Epoch | None = None) -> Physics:
-    """Read [states], [memory], [groups], [dynamics] or [step], [parameters] and [sensors]."""
+def read_physics(file: Table, units: Units, epoch: Epoch | None = None, forces: ForceChoice | None = None) -> Physics:
+    """Read [states], [memory], [groups], [dynamics] or [step], [parameters] and [sensors]; `forces` are those of [earth]."""
     before = len(file.faults)
-    out = Physics()
+    out = Physics(forces=forces)
     out.units |= named_units(file, "states", units, "state")
     out.states = list(out.units)
     if not out.states and len(file.faults) == before:
@@ -76,32 +86,30 @@ def read_physics(file: Table, units: Units, epoch: Epoch | None = None) -> Physi
         return out
     _memory(file.table("memory"), out)
     parameters = _parameters(file.table("parameters"), units, out)
-    out.functions = read_functions(file.table("functions"), epoch)
-    out.definitions = _definitions(file.table("definitions"), {*out.units, TIME, *([STEP] if "step" in file else [])}, out)
-    dynamics = _dynamics(file, out)
+    given = {} if forces is None or epoch is None else forces.functions(epoch)
+    out.functions = {**given, **read_functions(file.table("functions"), epoch)}
+    known = {*out.known, *([STEP] if "step" in file else [])}
+    out.definitions = read_definitions(file.table("definitions"), known, out)
+    out.dynamics = _dynamics(file, out)
     sensors = [_sensor(name, table, units, out, epoch) for name, table in file.table("sensors").tables()]
     out.groups = _groups(file, out)
     if len(file.faults) == before:
         labels = {s: out.units[s].label for s in out.states if out.units[s].label}
         with file.faults.at(""):
-            equations = tuple(dynamics[s] for s in out.states)
-            sound = tuple(s for s in sensors if s is not None)
-            discrete = "step" in file
-            out.model = shared(
-                Model(
-                    tuple(out.states),
-                    equations,
-                    sound,
-                    tuple(parameters),
-                    out.groups,
-                    labels,
-                    discrete,
-                    out.memory,
-                    out.definitions,
-                    out.functions,
-                )
-            )
+            out.model = shared(_model(out, parameters, [s for s in sensors if s is not None], labels, "step" in file))
     return out
+
+
+def _model(out: Physics, parameters: list[Parameter], sensors: list[Sensor], labels: dict[str, str], discrete: bool) -> Model:
+    dynamics, definitions, functions = out.dynamics, out.definitions, dict(out.functions)
+    if out.forces is not None:
+        dynamics = dynamics_of(out.forces, dynamics)
+        seen = [name for sensor in sensors for name in sensor.free_names]
+        definitions = definitions_of(out.forces, definitions, [*dynamics.values(), *definitions.values(), *seen])
+    equations = [dynamics[s] for s in out.states]
+    return Model(
+        out.states, equations, sensors, parameters, out.groups, labels, discrete, out.memory, definitions, functions
+    )  # fmt: skip
 
 
 def named_units(table: Table, key: str, units: Units, what: str) -> dict[str, Unit]:
@@ -189,16 +197,19 @@ def _parameter(name: str, table: Table, units: Units, out: Physics) -> Parameter
 def _dynamics(file: Table, out: Physics) -> dict[str, str]:
     """Text of every state's equation."""
     key = "step" if "step" in file else "dynamics"
-    if "step" in file and "dynamics" in file:
-        file.fault("dynamics", "stands beside [step]: rates or a step x[k+1], not both")
-        file.raw("dynamics")
-    if key not in file:
+    other = "dynamics" if "dynamics" in file else "earth" if out.forces is not None else ""
+    if "step" in file and other:
+        file.fault(other, "stands beside [step]: rates or a step x[k+1], not both")
+        file.raw(other)
+    if key not in file and out.forces is None:
         file.fault("dynamics", "is missing: give the rate of every state")
         return {}
     table = file.table(key)
-    allowed = {*out.units, *_names(out.definitions), TIME, *([STEP] if key == "step" else [])}
-    equations = {state: equation(table, state, allowed, outside=out.functions) for state in out.states}
-    for state in out.states:
+    allowed = {*out.known, *([STEP] if key == "step" else [])}
+    moved = () if out.forces is None else out.forces.forces.dynamics
+    wanted = [state for state in out.states if state in table or state not in moved]
+    equations = {state: equation(table, state, allowed, outside=out.functions) for state in wanted}
+    for state in wanted:
         if state not in table:
             table.fault("", f"has no equation for state {state!r}")
     if out.states:
@@ -211,7 +222,7 @@ def _names(definitions: Collection[str]) -> list[str]:
     return [name.strip() for key in definitions for name in key.split(",")]
 
 
-def _definitions(
+def read_definitions(
     table: Table, known: Collection[str], out: Physics, hint: str = "", outside: Collection[str] | None = None
 ) -> dict[str, str]:
     """Named values of equations, which may use one another; one key names all values of a function."""
@@ -234,7 +245,7 @@ def _roots(table: Table, known: Collection[str], out: Physics, outside: Collecti
         read["start"] = equation(inner, "start", known, OWN, outside) if "start" in inner else "0"
         if "iterations" in inner:
             read["iterations"] = inner.raw("iterations")
-        read["definitions"] = _definitions(inner.table("definitions"), allowed, out, OWN, outside)
+        read["definitions"] = read_definitions(inner.table("definitions"), allowed, out, OWN, outside)
         read["roots"] = _roots(inner.table("roots"), allowed, out, outside)
         inner.finish()
         found[name] = read
@@ -274,10 +285,10 @@ def _sensor(name: str, table: Table, units: Units, out: Physics, epoch: Epoch | 
     for clash in numbers.keys() & out.units.keys():
         table.fault("numbers", f"names {clash!r}, which is also a state or a parameter")
     outside = {*out.functions, AT, STATION}
-    known = {*out.units, *_names(out.definitions), *numbers, TIME}
+    known = {*out.known, *numbers}
     solved = table.table("roots")
     known |= {*_provided(solved.data)}
-    definitions = _definitions(table.table("definitions"), known, out, OWN, outside)
+    definitions = read_definitions(table.table("definitions"), known, out, OWN, outside)
     roots = _roots(solved, {*known, *_names(definitions)}, out, outside)
     for clash in {*_names(definitions)} & (numbers.keys() | {*_names(out.definitions)}):
         table.fault("definitions", f"names {clash!r}, which has a meaning already")

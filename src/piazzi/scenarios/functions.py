@@ -43,6 +43,8 @@ def write_function(function: Any) -> dict[str, Any]:
     if isinstance(function, Gravity) and isinstance(function.model, str | Path):
         out: dict[str, Any] = {"kind": "gravity", "model": str(function.model), "degree": function.degree}
         return out | {"gradient_degree": function.gradient_degree, "on": function.on}
+    if isinstance(function, Gravity):
+        return _written_field(function)
     if isinstance(function, Samples):
         out = {"kind": "table", "times": function.times.tolist(), "values": function.values.tolist(), "terms": function.terms}
         return out if function.error is None else out | {"error": function.error}
@@ -50,12 +52,33 @@ def write_function(function: Any) -> dict[str, Any]:
         nodes = {name: x.tolist() for name, x in zip("xy", function.nodes, strict=False)}
         out = {"kind": "interpolation", **nodes, "values": function.values.tolist(), "outside": list(function.outside)}
         return out if function.error is None else out | {"error": function.error}
-    if isinstance(function, Rotation) and function.eop is None:
-        return {"kind": "rotation", "from": function.from_, "to": function.to}
+    if isinstance(function, Rotation):
+        out = {"kind": "rotation", "from": function.from_, "to": function.to}
+        return out if function.eop is None else out | {"eop": _written_orientation(function.eop)}
     if isinstance(function, Body):
         out = {"kind": "body", "body": function.name, "center": function.center}
         return out if function.kernel is None else out | {"kernel": str(function.kernel)}
     raise ValueError(f"function {type(function).__name__} cannot be written to a file: it is known in Python only")
+
+
+def _written_field(function: Any) -> dict[str, Any]:
+    """A field as far as it is used, in numbers: the tide and the date are in them already."""
+    field, N = function.field, function.degree
+    c, s = (table[: N + 1, : N + 1].tolist() for table in (field.c, field.s))
+    about = {"name": field.name, "gm": field.gm, "radius": field.radius, "tide_system": field.tide_system}
+    numbers = {**about, "source": field.source, "c": c, "s": s}
+    return {"kind": "gravity", "numbers": numbers, "gradient_degree": function.gradient_degree, "on": function.on}
+
+
+def _written_orientation(eop: Any) -> Any:
+    """Constants, or the file that a table is from; raises ValueError for a table that is from none."""
+    from piazzi.earth.eop import EOP
+
+    if isinstance(eop, EOP):
+        return vars(eop)
+    if not Path(eop.source).is_file():
+        raise ValueError(f"Earth orientation of {eop.source!r} cannot be written to a file: there is no such file")
+    return str(Path(eop.source).absolute())
 
 
 def _path(table: Table, text: str) -> Path:
@@ -66,10 +89,25 @@ def _path(table: Table, text: str) -> Path:
 def _gravity(table: Table, epoch: Epoch | None) -> Any:
     from piazzi.earth.gravity import Gravity
 
-    model = table.text("model", "EGM2008") or "EGM2008"
+    model: Any = table.text("model", "EGM2008") or "EGM2008"
     is_file = "." in model or "/" in model
+    if "numbers" in table:
+        is_file, model = False, _field(table.table("numbers"))
     given = {key: table.raw(key) for key in ("degree", "gradient_degree", "on") if key in table}
     return Gravity(_path(table, model) if is_file else model, **given)
+
+
+def _field(table: Table) -> Any:
+    """The field that `_written_field` wrote."""
+    import numpy as np
+
+    from piazzi.earth.fields import GravityField
+
+    about = {key: table.text(key, "") for key in ("name", "tide_system", "source")}
+    c, s = (np.array(table.raw(key), dtype=float) for key in "cs")
+    if c.ndim != 2 or c.shape != s.shape or len(c) != c.shape[-1]:
+        raise ValueError(f"coefficients c and s have shapes {c.shape} and {s.shape}; they must be square and alike")
+    return GravityField(gm=table.number("gm") or 0.0, radius=table.number("radius") or 0.0, c=c, s=s, **about)  # type: ignore[arg-type]
 
 
 def _samples(table: Table, epoch: Epoch | None) -> Any:
@@ -108,7 +146,10 @@ def _rotation(table: Table, epoch: Epoch | None) -> Any:
             table.fault(key, "is missing: the name of a frame, such as 'GCRF' or 'ITRF'")
     if given is None or wanted is None or epoch is None:
         return _undated(table, epoch)
-    return Rotation(given, wanted, epoch)
+    from piazzi.earth.defaults import read_data
+
+    eop = table.raw("eop")
+    return Rotation(given, wanted, epoch, None if eop is None else read_data("eop", eop, table.faults.folder))
 
 
 def _body(table: Table, epoch: Epoch | None) -> Any:

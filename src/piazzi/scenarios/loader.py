@@ -19,6 +19,8 @@ from piazzi.problem import Problem, with_gauss_markov
 from piazzi.problem.checks import Array
 from piazzi.problem.epochs import epoch_given
 from piazzi.problem.gaps import is_restricted
+from piazzi.problem.truth import true_problem
+from piazzi.scenarios.earth import read_earth, with_forces
 from piazzi.scenarios.equations import read_physics
 from piazzi.scenarios.motion import read_gauss_markov, read_integrator, read_manoeuvres
 from piazzi.scenarios.scenario import Picture, Scenario, read_plan, read_recording, read_times
@@ -38,9 +40,9 @@ MAX_BYTES = 2**18
 _LONG_KEY = re.compile(rb"(?:[\w\"'-]{1,200}[ \t]{0,20}\.[ \t]{0,20}){30}")
 _PLACE = re.compile(r" \(at (line \d+, column \d+|end of document)\)$")
 SECTIONS = (
-    "title", "epoch", "units", "states", "memory", "groups", "functions", "definitions", "dynamics", "step", "parameters",
-    "sensors", "stations", "prior", "process_noise", "gauss_markov", "integrator", "manoeuvres", "times", "truth", "picture",
-    "study", "recording",
+    "title", "epoch", "units", "earth", "states", "memory", "groups", "functions", "definitions", "dynamics", "step",
+    "parameters", "sensors", "stations", "prior", "process_noise", "gauss_markov", "integrator", "manoeuvres", "times", "truth",
+    "picture", "study", "recording",
 )  # fmt: skip
 MAX_STEPS = 10**10
 MAX_ROWS = 2 * 10**7
@@ -177,7 +179,11 @@ def read_problem(file: Table, name: str, units: Units, start: float | None = Non
     """The problem, or None after noting every fault; its prior is at `start` unless the file says otherwise."""
     before = len(file.faults)
     epoch = _epoch(file)
-    physics = read_physics(file, units, epoch)
+    forces = read_earth(file.table("earth"), epoch) if "earth" in file else None
+    if len(file.faults) > before:
+        return None  # without its forces a file lacks states and names, which would be faults of its other sections
+    file = file if forces is None else with_forces(file, forces)
+    physics = read_physics(file, units, epoch, forces)
     parameters = read_parameters(file.table("parameters"), physics, physics.model)
     integrator = read_integrator(file.table("integrator"), units)
     if "stations" not in file:
@@ -189,13 +195,15 @@ def read_problem(file: Table, name: str, units: Units, start: float | None = Non
     noise = read_noise(file.table("process_noise"), physics) if "process_noise" in file else None
     gauss_markov = read_gauss_markov(file.table("gauss_markov"), physics, units) if "gauss_markov" in file else None
     manoeuvres = read_manoeuvres(file, physics, units)
-    truth = read_truth(file.table("truth"), physics, prior, units) if "truth" in file else None
+    truth = read_truth(file, physics, prior, units, epoch) if "truth" in file else None
     if len(file.faults) > before or physics.model is None or prior is None:
         return None
     with file.faults.at(""):
         places = [s for s in stations if s is not None]
         given = (physics.model, prior, noise, places, parameters, integrator, prior_time, truth, name, manoeuvres)
         problem = Problem(*given, functions=physics.functions, epoch=epoch)
+        with file.faults.at("truth"):
+            true_problem(problem)
         with file.faults.at("gauss_markov"):
             return problem if gauss_markov is None else with_gauss_markov(problem, **gauss_markov)
     return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -12,13 +12,17 @@ from piazzi.problem import Gaussian, Problem, ProcessNoise, Truth
 from piazzi.scenarios.equations import Physics
 from piazzi.scenarios.motion import read_integrator, read_manoeuvres
 from piazzi.scenarios.table import Table, joined
+from piazzi.scenarios.true_physics import read_true_physics
 from piazzi.scenarios.values import read_noise
-from piazzi.text import nearest
 from piazzi.units import Units
 
+if TYPE_CHECKING:
+    from piazzi.earth import Epoch
 
-def read_truth(table: Table, physics: Physics, prior: Gaussian | None, units: Units) -> Truth | None:
+
+def read_truth(file: Table, physics: Physics, prior: Gaussian | None, units: Units, epoch: Epoch | None = None) -> Truth | None:
     """What really happens, where it differs from what the estimators assume."""
+    table = file.table("truth")
     state = table.raw("state")
     mean = None
     if isinstance(state, str):
@@ -27,7 +31,6 @@ def read_truth(table: Table, physics: Physics, prior: Gaussian | None, units: Un
     elif state is not None:
         vector = table.vector("state", physics.states)
         mean = None if vector is None else vector * physics.factors(physics.states)
-    parameters = _true_parameters(table.table("parameters"), physics)
     noise: ProcessNoise | None = None
     if isinstance(table.raw("process_noise"), bool):
         noise = None if table.raw("process_noise") else ProcessNoise(np.zeros(len(physics.states)), "step")
@@ -41,20 +44,12 @@ def read_truth(table: Table, physics: Physics, prior: Gaussian | None, units: Un
     for i, text in enumerate(accept):
         with table.faults.at(joined(table.at("accept"), i)):
             check(text, known)
+    true = read_true_physics(file, table, physics, units, epoch)
     table.finish()
-    return Truth(mean, parameters, noise, integrator, bool(noisy), manoeuvres, accept)
-
-
-def _true_parameters(table: Table, physics: Physics) -> dict[str, float]:
-    known = [name for name in physics.units if name not in (*physics.states, *physics.memory)]
-    out: dict[str, float] = {}
-    for name in table.data:
-        if name not in known:
-            table.fault(name, f"is no parameter{nearest(name[:60], known)}")
-            continue
-        value = table.number(name, physics.units[name].factor)
-        out |= {} if value is None else {name: value}
-    return out
+    return Truth(
+        mean, true.parameters, noise, integrator, bool(noisy), manoeuvres, accept,
+        true.dynamics, true.definitions, true.functions, true.stations,
+    )  # fmt: skip
 
 
 def vary(

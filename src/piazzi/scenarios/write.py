@@ -50,7 +50,7 @@ def problem_to_tables(problem: Problem, *, whole: bool = True) -> dict[str, Any]
     if problem.prior_time is not None:
         tables["prior"]["time"] = float(problem.prior_time)
     if problem.truth is not None:
-        tables["truth"] = _truth(problem.truth)
+        tables["truth"] = _truth(problem.truth, whole)
     if whole:
         problem_from_tables(tables, problem.name, "the problem cannot be written to a file")
     return tables
@@ -129,11 +129,18 @@ def _noise(noise: ProcessNoise) -> dict[str, Any]:
     return {key: _listed(noise.covariance), "per": noise.per, "method": noise.method, "axes": noise.axes}
 
 
-def _truth(truth: Truth) -> dict[str, Any]:
+def _truth(truth: Truth, whole: bool) -> dict[str, Any]:
     out: dict[str, Any] = {
         "parameters": {k: float(v) for k, v in truth.parameters.items()},
         "measurement_noise": bool(truth.measurement_noise),
     }
+    for key, texts in (("dynamics", truth.dynamics), ("definitions", truth.definitions)):
+        if texts:
+            out[key] = {left: str(text) for left, text in texts.items()}
+    if truth.functions:
+        out["functions"] = {name: write_function(f) if whole else f.checksum for name, f in truth.functions.items()}
+    if truth.stations:
+        out["stations"] = {name: {k: float(v) for k, v in numbers.items()} for name, numbers in truth.stations.items()}
     if truth.accept:
         out["accept"] = list(truth.accept)
     if truth.state is not None:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from piazzi import kernels
-from piazzi.problem import Gaussian, Problem, Tracking, Truth
+from piazzi.problem import Problem, Tracking, Truth
 from piazzi.problem.arcs import arc
 from piazzi.problem.checks import Array, check_span, finite_vector, numeric
 from piazzi.problem.gaps import is_restricted
 from piazzi.problem.inputs import Inputs
+from piazzi.problem.truth import true_problem
 from piazzi.simulation.rule import MOST_DRAWS, NoTruthError, Rule
 from piazzi.simulation.visibility import rules, seen
 
@@ -133,25 +133,6 @@ def check_finite(problem: Problem, epochs: Array, first: Array, states: Array) -
         k = int(np.argmin(np.isfinite(states).all(axis=1)))
         start_text = ", ".join(f"{name} = {value:g}" for name, value in zip(problem.model.names, first, strict=True))
         raise ValueError(f"the simulated truth is not finite from epoch {k} (t = {epochs[k]:g} s); it started at {start_text}")
-
-
-def true_problem(problem: Problem) -> Problem:
-    """The problem as it really is: with the parameters, process noise and integrator of its `truth` half."""
-    truth = problem.truth
-    if truth is None:
-        return problem
-    parameters = dict(problem.parameters)
-    for name, value in truth.parameters.items():
-        number = float(numeric(value, f"true value of parameter {name!r}"))
-        parameters[name] = Gaussian(number, 0.0) if isinstance(parameters.get(name), Gaussian) else number
-    return replace(
-        problem,
-        parameters=parameters,
-        process_noise=truth.process_noise or problem.process_noise,
-        integrator=truth.integrator or problem.integrator,
-        manoeuvres=problem.manoeuvres if truth.manoeuvres is None else truth.manoeuvres,
-        truth=None,
-    )
 
 
 def _first_state(problem: Problem, actual: Problem, truth: Truth, rng: np.random.Generator) -> Array:

@@ -60,6 +60,10 @@ def problem_changes(problem: Problem) -> dict[str, Change]:
     }
     for station in problem.stations:
         out[f"R.{station.name}.scale"] = _station_change(station.name)
+    for name, recipe in problem.functions.items():
+        settings = [key for key in ("degree", "gradient_degree") if hasattr(recipe, key)]
+        for owner in (name, "earth") if name == "field" else (name,):
+            out |= {f"{owner}.{key}": _function_change(name, key) for key in settings}
     for name in problem.model.parameter_names:
         out[name] = _parameter_change(name)
     return out
@@ -158,5 +162,20 @@ def _parameter_change(name: str) -> Change:
         if truth is not None and name in truth.parameters:
             truth = replace(truth, parameters={**truth.parameters, name: value})
         return replace(problem, parameters=parameters, truth=truth)
+
+    return change
+
+
+def _function_change(name: str, key: str) -> Change:
+    """Another setting of a function from outside, that of the truth half too."""
+
+    def changed(functions: Mapping[str, Any], value: float) -> dict[str, Any]:
+        return {**functions, name: replace(functions[name], **{key: value})} if name in functions else dict(functions)
+
+    def change(problem: Problem, value: float) -> Problem:
+        truth = problem.truth
+        if truth is not None:
+            truth = replace(truth, functions=changed(truth.functions, value))
+        return replace(problem, functions=changed(problem.functions, value), truth=truth)
 
     return change
