@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
-from piazzi.scenarios import names, show
+from piazzi.scenarios import load_scenario, names, show
 
 SCENARIO = "b612-range"
 
@@ -81,6 +81,16 @@ def test_the_scenarios_are_listed(call):
         assert [line.split()[0] for line in lines] == names()
     found = call("scenarios", "list", "--json").document
     assert [s["name"] for s in found["scenarios"]] == names()
+
+
+def test_equations_that_result_are_shown(call):
+    text = call("scenarios", "show", "b612-range", "--equations").out
+    model = load_scenario("b612-range").problem.model
+    for state, rate in zip(model.states, model.dynamics, strict=True):
+        assert f"d{state}/dt = {rate}" in text
+    for left, equation in model.definitions:
+        assert f"{left} = {equation}\n" in text
+    assert "# what is true instead" in call("scenarios", "show", "founding-study-mismatched", "--equations").out
 
 
 @pytest.mark.parametrize("name", [*names(), "template"])

@@ -49,13 +49,20 @@ def list_(as_json: bool) -> int:
 
 @command.command()
 @click.argument("name", default="template")
-def show(name: str) -> int:
+@click.option("--equations", "as_equations", is_flag=True, help="Print the equations that result; NAME may be a file.")
+def show(name: str, as_equations: bool) -> int:
     """Print the text of a scenario.
 
     The file is commented and made to be edited; without NAME it is a template.
     """
+    from piazzi.scenarios import load_scenario
     from piazzi.scenarios import show as text_of
 
+    if as_equations:
+        from piazzi.present.equations import equations
+
+        output.print_text(equations(load_scenario(name).problem))
+        return DONE
     output.print_text(text_of(name))
     return DONE
 

@@ -42,7 +42,9 @@ def read_true_physics(file: Table, table: Table, physics: Physics, units: Units,
         forces = read_earth(table.table("earth"), epoch, base)
         if forces is None:
             return out
-        out.functions = forces.functions(epoch)  # type: ignore[arg-type]
+        meant = forces.functions(epoch)  # type: ignore[arg-type]
+        same = {name: f.checksum for name, f in physics.functions.items()}
+        out.functions = {name: f for name, f in meant.items() if same.get(name) != f.checksum}
     out.functions |= read_functions(table.table("functions"), epoch)
     own = table.table("parameters")
     equations = table.table("dynamics"), table.table("definitions")
