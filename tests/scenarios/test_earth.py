@@ -5,6 +5,7 @@ import pytest
 
 import piazzi as pz
 from piazzi import earth
+from piazzi.present.equations import equations
 from piazzi.problem.truth import true_problem
 from piazzi.scenarios import ScenarioError, load_scenario
 
@@ -166,6 +167,9 @@ def test_another_true_degree_is_the_same_model(tmp_path):
     assert true.model == problem.model
     assert true.functions["field"].degree == 10
     assert problem.functions["field"].degree == 4
+    different = equations(problem).partition("# what is true instead\n")[2].splitlines()
+    assert [line[:6] for line in different] == ["field:"]
+    assert "to degree 10" in different[0]
 
 
 def test_true_definitions(tmp_path):

@@ -15,10 +15,9 @@ def equations(problem: Problem) -> str:
 
 def _lines(problem: Problem) -> Iterator[str]:
     model = problem.model
-    yield "# what is defined"
-    for names, text in model.definitions:
-        yield f"{names} = {text}"
-    yield from ("", "# the next state" if model.discrete else "# rates of the states")
+    if model.definitions:
+        yield from ("# what is defined", *(f"{names} = {text}" for names, text in model.definitions), "")
+    yield "# the next state" if model.discrete else "# rates of the states"
     for state, text in zip(model.states, model.dynamics, strict=True):
         left = f"{state}[k+1]" if model.discrete else f"d{state}/dt"
         unit = model.unit(state)
