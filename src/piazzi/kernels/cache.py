@@ -15,12 +15,11 @@ from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
-from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, live_entries, note_source, plain_entries
+from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, live_entries, look_for_garbage, note_source, plain_entries
 from piazzi.kernels.folder import Folder, private_folder, writable_folder
 from piazzi.kernels.library import load_objects
-from piazzi.kernels.names import FRAGMENTS
 from piazzi.kernels.settings import may_be_kept
-from piazzi.kernels.spec import KernelSpec, tried
+from piazzi.kernels.spec import KernelSpec, fragment_file, tried
 
 LOGGER = logging.getLogger("piazzi.kernels")
 MANIFEST = "manifest.json"
@@ -58,7 +57,7 @@ def _made(spec: KernelSpec, compiled: bool) -> SimpleNamespace:
 @contextlib.contextmanager
 def fragment(name: str, text: str) -> Iterator[None]:
     """A fragment of one's own within a block, for trying and for tests; raises ValueError where there is one of that name."""
-    if name in tried or (FRAGMENTS / f"{name}.py").exists():
+    if name in tried or fragment_file(name).exists():
         raise ValueError(f"there is a kernel fragment {name!r} already")
     tried[name] = text
     try:
@@ -70,9 +69,10 @@ def fragment(name: str, text: str) -> Iterator[None]:
 
 
 def _renew_lock() -> None:
-    """In a new process the thread that held the lock is not there."""
+    """In a new process the thread that held the lock, and what it was building, is not there."""
     global _making  # noqa: PLW0603
     _making = threading.RLock()
+    look_for_garbage()
 
 
 if hasattr(os, "register_at_fork"):

@@ -37,6 +37,8 @@ __all__ = [
 ]
 
 LINE = 64  # bytes that a processor fetches at a time
+# Passes for functions within functions and for expressions of whole arrays: kernels have neither, and looking takes a tenth
+_NOTHING_TO_DO = ("inline_closure_likes", "nopython_rewrites")
 
 
 class _Unloaded(JITCodeLibrary):
@@ -87,7 +89,9 @@ class _Pipeline(CompilerBase):
         state = self.state
         state.library = self.kind(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+        passes = DefaultPassBuilder.define_nopython_pipeline(state)
+        passes.passes = [(one, why) for one, why in passes.passes if one.name() not in _NOTHING_TO_DO]
+        return [passes]
 
 
 class HelperPipeline(_Pipeline):

@@ -36,7 +36,8 @@ def opened(text: str) -> str:
 
 def definitions(text: str) -> str:
     """Source of the bundles that a text uses."""
-    used = [b for name, b in BUNDLES.items() if re.search(rf"\b{name}\(", text)]
+    called = {*re.findall(r"\b(\w+)\(", text)}
+    used = [b for name, b in BUNDLES.items() if name in called]
     return "".join(f"{b.__name__} = namedtuple({b.__name__!r}, {list(b.slots)!r})\n" for b in used)
 
 

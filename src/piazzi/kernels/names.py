@@ -5,9 +5,14 @@ from __future__ import annotations
 import ast
 import builtins
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
+
+from piazzi.kernels.entries import is_entry
 
 FRAGMENTS = Path(__file__).parent / "fragments"
+MOST_TEXTS = 200  # parts that are remembered, for other modules that have them too
 
 
 def check_names(parts: Mapping[str, str]) -> None:
@@ -20,29 +25,44 @@ def check_names(parts: Mapping[str, str]) -> None:
     """
     from piazzi.kernels import plain
 
-    trees = {part: ast.parse(text) for part, text in parts.items()}
     home: dict[str, str] = {}
-    for part, tree in trees.items():
-        for name in provided(tree):
+    functions: dict[str, _Function] = {}
+    for part, text in parts.items():
+        names, inside = _read(text)
+        for name in names:
             if name in home:
                 where = f"twice in {part!r}" if home[name] == part else f"in {home[name]!r} and in {part!r}"
                 raise ValueError(f"kernel function {name!r} is defined {where}")
             home[name] = part
+        functions |= inside
     known = home.keys() | vars(plain).keys() | vars(builtins).keys()
-    functions = {f.name: f for tree in trees.values() for f in tree.body if isinstance(f, ast.FunctionDef)}
-    for function in reached(functions):
-        for name in sorted(needed(functions[function]) - known):
+    for function in _reached(functions):
+        for name in sorted(functions[function].needs - known):
             where = f"kernel fragment {home[function]!r}: {function!r}"
             raise ValueError(f"{where} needs {name!r}, which no part of the kernel defines{_elsewhere(name)}")
 
 
-def reached(functions: Mapping[str, ast.FunctionDef]) -> list[str]:
+class _Function(NamedTuple):
+    is_entry: bool
+    needs: frozenset[str]
+
+
+@lru_cache(maxsize=MOST_TEXTS)
+def _read(text: str) -> tuple[tuple[str, ...], Mapping[str, _Function]]:
+    """What a part defines, and its functions."""
+    tree = ast.parse(text)
+    functions = {f.name: _Function(is_entry(f), frozenset(needed(f))) for f in tree.body if isinstance(f, ast.FunctionDef)}
+    return tuple(provided(tree)), functions
+
+
+def _reached(functions: Mapping[str, _Function]) -> Iterable[str]:
     """Functions that an entry calls, directly or not: the others are never compiled."""
-    found = [
-        name for name, f in functions.items() if any(isinstance(d, ast.Name) and d.id == "entry" for d in f.decorator_list)
-    ]
-    for name in found:
-        found += [other for other in needed(functions[name]) if other in functions and other not in found]
+    found = dict.fromkeys(name for name, f in functions.items() if f.is_entry)
+    waiting = [*found]
+    while waiting:
+        new = [other for other in sorted(functions[waiting.pop()].needs) if other in functions and other not in found]
+        found |= dict.fromkeys(new)
+        waiting += new
     return found
 
 

@@ -1,0 +1,42 @@
+"""Compiling leaves the process as it was, and leaves out only passes that Numba has."""
+
+import gc
+
+import pytest
+
+from piazzi.kernels import build
+from piazzi.kernels.settings import own_settings
+
+DOUBLED = "from piazzi.kernels.compiled import *\n\n\n@entry\ndef run(x: Array):\n    x[0] = 2.0 * x[0]\n"
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+@pytest.mark.parametrize("source", [DOUBLED, "raise OSError"])
+def test_no_garbage_is_looked_for_while_kernels_are_compiled(enabled, source, monkeypatch):
+    seen = []
+    original = build.module_of
+    monkeypatch.setattr(build, "module_of", lambda text: (seen.append(gc.isenabled()), original(text))[1])
+    was = gc.isenabled()
+    (gc.enable if enabled else gc.disable)()
+    try:
+        if source == DOUBLED:
+            build.compile_entries(source)
+        else:
+            with pytest.raises(OSError):
+                build.compile_entries(source)
+        assert seen == [False]
+        assert gc.isenabled() == enabled
+    finally:
+        (gc.enable if was else gc.disable)()
+
+
+def test_passes_that_are_left_out_are_among_numbas():
+    with own_settings():
+        from numba.core.compiler import DefaultPassBuilder, Flags, StateDict
+
+        from piazzi.kernels import compiler
+
+        state = StateDict()
+        state.flags, state.func_ir = Flags(), None
+        names = {one.name() for one, _ in DefaultPassBuilder.define_nopython_pipeline(state).passes}
+    assert names >= {*compiler._NOTHING_TO_DO}
