@@ -12,6 +12,7 @@ SECTIONS = {
     "start_up": "whole processes: warm, cold, help, import",
     "study": "many runs in lanes beside the C floor, and a study of 10,000 runs: time, memory, second core",
     "live": "one measurement at a time",
+    "space": "orbits about the Earth beside the C floor: field, tables, steps, days with transition matrix",
     "files": "files of a million measurements",
     "length": "time per epoch and memory against the number of epochs",
 }
