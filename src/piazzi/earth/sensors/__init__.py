@@ -4,8 +4,12 @@ States are those of `Forces`: x, y, z (m) and vx, vy, vz (m/s) on the axes of th
 """
 
 from piazzi.earth.sensors.directions import azimuth_elevation, right_ascension_declination
+from piazzi.earth.sensors.doppler import frequency, radar_delay, radar_doppler, range_rate
 from piazzi.earth.sensors.instrument import Instrument
 from piazzi.earth.sensors.position import position
 from piazzi.earth.sensors.ranging import range  # noqa: A004
 
-__all__ = ["Instrument", "azimuth_elevation", "position", "range", "right_ascension_declination"]
+__all__ = [
+    "Instrument", "azimuth_elevation", "frequency", "position", "radar_delay", "radar_doppler", "range", "range_rate",
+    "right_ascension_declination",
+]  # fmt: skip

@@ -16,33 +16,38 @@ _KLOBUCHAR = {f"{name}{i}": 0.0 for name in ("alpha", "beta") for i in range(4)}
 
 
 class Air:
-    """Definitions, and the numbers of the station that they use, as they come together."""
+    """Definitions, and the numbers of the station that they use, as they come together; `prefix` is that of all names."""
 
-    def __init__(self) -> None:
+    def __init__(self, prefix: str = "") -> None:
+        self.prefix = prefix
         self.definitions: dict[str, str] = {}
         self.numbers: dict[str, float] = {}
 
     def look(self, instant: str, satellite: str, station: str) -> None:
         """East, north and up of the line to the satellite (`look_e`, `look_n`, `look_u`), and its `elevation`."""
-        self.definitions |= difference("line", satellite, station)
-        self.turn(instant, tuple(f"line_{a}" for a in AXES))
-        self.definitions["elevation"] = "atan2(look_u, sqrt(look_e**2 + look_n**2))"
+        line = f"{self.prefix}line"
+        self.definitions |= difference(line, satellite, station)
+        self.turn(instant, tuple(f"{line}_{a}" for a in AXES))
 
     def turn(self, instant: str, line: tuple[str, ...]) -> None:
-        """East, north and up of a line whose components are along the axes of the GCRF."""
-        self.numbers |= PLACE | {"longitude": 0.0}
-        self.numbers.pop("height")
+        """East, north and up of a line whose components are along the axes of the GCRF, and its `elevation`."""
+        p = self.prefix
+        self.numbers |= {"latitude": 0.0, "longitude": 0.0}
         self.definitions |= {
-            names("ground"): f"fixed({instant}, {', '.join(line)})",
-            "look_out": "cos(longitude)*ground_x + sin(longitude)*ground_y",
-            "look_e": "cos(longitude)*ground_y - sin(longitude)*ground_x",
-            "look_n": "cos(latitude)*ground_z - sin(latitude)*look_out",
-            "look_u": "cos(latitude)*look_out + sin(latitude)*ground_z",
+            names(f"{p}ground"): f"fixed({instant}, {', '.join(line)})",
+            f"{p}look_out": f"cos(longitude)*{p}ground_x + sin(longitude)*{p}ground_y",
+            f"{p}look_e": f"cos(longitude)*{p}ground_y - sin(longitude)*{p}ground_x",
+            f"{p}look_n": f"cos(latitude)*{p}ground_z - sin(latitude)*{p}look_out",
+            f"{p}look_u": f"cos(latitude)*{p}look_out + sin(latitude)*{p}ground_z",
+            f"{p}elevation": f"atan2({p}look_u, sqrt({p}look_e**2 + {p}look_n**2))",
         }
 
-    def add(self, prefix: str, formula: media.Formula, **given: str) -> None:
-        """A formula, its names with a prefix."""
-        self.definitions |= renamed(formula.definitions, prefix, given)
+    def add(self, name: str, formula: media.Formula, **given: str) -> str:
+        """A formula at the elevation, its names with a prefix, which is returned."""
+        prefix = f"{self.prefix}{name}"
+        at = {"elevation": f"{self.prefix}elevation"} if "elevation" in formula.arguments else {}
+        self.definitions |= renamed(formula.definitions, prefix, at | given)
+        return prefix
 
     def troposphere(self, model: str) -> str:
         """One way through the neutral air at the elevation: the name of the delay (m)."""
@@ -50,13 +55,12 @@ class Air:
         self.numbers |= WEATHER | PLACE
         if model == "saastamoinen":
             self.numbers |= {name: _COEFFICIENTS[name] for name in MAPPINGS}
-            self.add("zenith", media.saastamoinen)
-            self.add("slant", media.mapping)
-            self.definitions["air"] = "zenith_hydrostatic*slant_map_hydrostatic + zenith_wet*slant_map_wet"
-            return "air"
+            zenith, slant = self.add("zenith", media.saastamoinen), self.add("slant", media.mapping)
+            text = f"{zenith}_hydrostatic*{slant}_map_hydrostatic + {zenith}_wet*{slant}_map_wet"
+            self.definitions[f"{self.prefix}air"] = text
+            return f"{self.prefix}air"
         self.numbers["wavelength"] = 532e-9
-        self.add("laser", media.mendes_pavlis if model == "mendes-pavlis" else media.marini_murray)
-        return "laser_delay"
+        return self.add("laser", media.mendes_pavlis if model == "mendes-pavlis" else media.marini_murray) + "_delay"
 
     def ionosphere(self, model: str, legs: int) -> str:
         """One way through the ionosphere at the elevation, the mean of the legs: the name of the delay of codes (m)."""
@@ -64,13 +68,14 @@ class Air:
         self.numbers["frequency"] = 2e9
         if model == "single-layer":
             self.numbers |= {"electrons": 0.0, "layer": 450e3}
-            self.add("ion", media.single_layer)
+            delay = self.add("ion", media.single_layer) + "_delay"
         else:
             self.numbers |= {"gps_seconds": 0.0, "latitude": 0.0, "longitude": 0.0, **_KLOBUCHAR}
-            self.definitions["azimuth_there"] = "atan2(look_e, look_n)"
-            self.add("ion", media.klobuchar, azimuth="azimuth_there", gps_seconds="gps_seconds + t")
+            there = f"{self.prefix}look_azimuth"
+            self.definitions[there] = f"atan2({self.prefix}look_e, {self.prefix}look_n)"
+            delay = self.add("ion", media.klobuchar, azimuth=there, gps_seconds="gps_seconds + t") + "_delay"
         if legs == 1:
-            return "ion_delay"
+            return delay
         self.numbers["uplink_frequency"] = 2e9
-        self.definitions["ion"] = "ion_delay*(1 + (frequency/uplink_frequency)**2)/2"
-        return "ion"
+        self.definitions[f"{self.prefix}ion_mean"] = f"{delay}*(1 + (frequency/uplink_frequency)**2)/2"
+        return f"{self.prefix}ion_mean"

@@ -9,7 +9,7 @@ from piazzi.earth import media
 from piazzi.earth.rotation import frame_named
 from piazzi.earth.sensors.air import PLACE, WEATHER, Air
 from piazzi.earth.sensors.instrument import Instrument, one_of
-from piazzi.earth.sensors.light import TAGS, C
+from piazzi.earth.sensors.light import C
 from piazzi.earth.sensors.position import Turn
 from piazzi.earth.sensors.ray import Ray, ray_of
 from piazzi.earth.sensors.text import AXES, component, difference, dot, names
@@ -53,8 +53,7 @@ def azimuth_elevation(
     one_of(angles, ANGLES[1:], "angles")
     ray = _seen(tag, steps, time_bias)
     air = Air()
-    air.turn(ray.instant, tuple(_sight(ray, angles)))
-    air.definitions["elevation"] = "atan2(look_u, sqrt(look_e**2 + look_n**2))"
+    air.turn(ray.received, tuple(_sight(ray, angles)))
     above = "elevation"
     if refraction is not None:
         _refract(air, refraction)
@@ -109,13 +108,12 @@ def right_ascension_declination(
         turn = "fixed" if axes == "ITRF" else f"to_{axes.lower()}"
         if axes != "ITRF":
             ray.makers[turn] = Turn(axes)
-        ray.definitions[names("turned")] = f"{turn}({ray.instant}, {', '.join(sight)})"
+        ray.definitions[names("turned")] = f"{turn}({ray.received}, {', '.join(sight)})"
         sight = [f"turned_{a}" for a in AXES]
     x, y, z = sight
     if any(word in " ".join(visible) for word in ("elevation", "mask")):
         air = Air()
-        air.turn(ray.instant, tuple(f"line_{a}" for a in AXES))
-        air.definitions["elevation"] = "atan2(look_u, sqrt(look_e**2 + look_n**2))"
+        air.turn(ray.received, tuple(f"line_{a}" for a in AXES))
         ray.definitions |= air.definitions
         ray.numbers |= air.numbers
     kinds = ("right_ascension", "declination")
@@ -126,8 +124,7 @@ def right_ascension_declination(
 
 def _seen(tag: str, steps: bool, time_bias: bool) -> Ray:
     """The signal that comes down, and the line along it."""
-    one_of(tag, TAGS, "tag")
-    ray = ray_of("two-way" if tag == "transmission" else "one-way", tag, steps, False, time_bias, None)
+    ray = ray_of("two-way" if tag == "transmission" else "one-way", tag, steps=steps, time_bias=time_bias)
     leg = ray.light.legs[0]
     ray.definitions |= difference("line", leg.satellite, leg.station)
     return ray
@@ -143,7 +140,7 @@ def _sight(ray: Ray, angles: str) -> list[str]:
         ray.definitions |= {f"sight_{a}": f"line_{a} + {rho}*{component(v, a)}/{C}" for a in AXES}
         return [f"sight_{a}" for a in AXES]
     ray.makers["earth_velocity"] = earth_velocity
-    ray.definitions[names("sun_way")] = f"earth_velocity({ray.instant})"
+    ray.definitions[names("sun_way")] = f"earth_velocity({ray.received})"
     ray.definitions |= {f"beta_{a}": f"sun_way_{a}/{C}" for a in AXES}
     ray.definitions |= {  # the aberration of one who moves with the Earth, undone: Klioner 2003, Astron. J. 125, 1580, eq. 10
         "rest": f"sqrt(1 - ({dot('beta', 'beta')}))",

@@ -32,12 +32,14 @@ class Instrument(Sensor):
     roles : roles of the parameters that its equations use, for a model
     makers : functions from outside that it calls, beside those of the forces: `functions` makes their data
     mapping : "niell" or "gmf", by which the troposphere is mapped
+    priors : mean and standard deviation that parameters may have, where the sensor knows any
     """
 
     defaults: Any = field(default=(), repr=False, compare=False)
     roles: Any = field(default=(), repr=False, compare=False)
     makers: Any = field(default=(), repr=False, compare=False)
     mapping: str = field(default="niell", repr=False, compare=False)
+    priors: Any = field(default=(), repr=False, compare=False)
 
     if TYPE_CHECKING:
 
@@ -76,6 +78,7 @@ class Instrument(Sensor):
         name: str | None = None,
         covariance: Any = None,
         weather: Weather | None = None,
+        place: Any = None,
         tides: bool = True,
         eop: Orientation | None = None,
         **numbers: Any,
@@ -90,6 +93,7 @@ class Instrument(Sensor):
         name : default that of the station
         covariance : of the components, in place of `sigma`
         weather : at the station, of the pass; default standard for its height
+        place : position and velocity over time (GCRF), a table of six columns, in place of a station on the ground
         tides : whether they move the station
         eop : orientation of the Earth; default the tables of the IERS
         numbers : values of `defaults` that differ, such as ``range_bias=0.1``; a Gaussian is estimated or considered
@@ -104,8 +108,8 @@ class Instrument(Sensor):
             if given not in known:
                 raise ValueError(f"sensor {self.name!r} has no number {given!r}{nearest(given, known)}")
         called = name or (station.name if station else self.name)
-        place, local = None, {}
-        if self.needs_place:
+        local: dict[str, float] = {}
+        if self.needs_place and place is None:
             if station is None or epoch is None:
                 raise ValueError(f"sensor {self.name!r} needs a station and the epoch of the problem")
             place = Place(station, Epoch(epoch), eop, tides)
@@ -144,19 +148,15 @@ def plain(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
 
 
-def biased(
-    value: str, component: str, biases: Mapping[str, str] | Sequence[str]
-) -> tuple[str, dict[str, float], dict[str, str]]:
-    """A value with its bias: text, numbers of the station and roles of parameters.
+def picked(name: str, owners: Mapping[str, str] | Sequence[str]) -> tuple[str, dict[str, float], dict[str, str]]:
+    """Parameters ``NAME_OWNER`` of stations or passes: text that is added, numbers of the station, roles.
 
-    Each of `biases`, names of stations or passes, has a parameter; a number of the station picks its own out of them, so that
-    one sensor serves all.
+    A number of each station picks its own parameter out of them, so that one sensor serves all.
     """
-    roles = dict(biases) if isinstance(biases, Mapping) else dict.fromkeys(biases, "estimated")
-    own = {plain(name): role for name, role in roles.items()}
-    text = f"{value} + {component}_bias" + "".join(f" + is_{name}*{component}_bias_{name}" for name in own)
-    numbers = {f"{component}_bias": 0.0} | {f"is_{name}": 0.0 for name in own}
-    return text, numbers, {f"{component}_bias_{name}": role for name, role in own.items()}
+    roles = dict(owners) if isinstance(owners, Mapping) else dict.fromkeys(owners, "estimated")
+    own = {plain(owner): role for owner, role in roles.items()}
+    text = "".join(f" + is_{owner}*{name}_{owner}" for owner in own)
+    return text, dict.fromkeys([f"is_{owner}" for owner in own], 0.0), {f"{name}_{owner}": role for owner, role in own.items()}
 
 
 def with_parameters(

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from piazzi.earth.rotation import frame_named
-from piazzi.earth.sensors.instrument import Instrument, biased, with_parameters
+from piazzi.earth.sensors.instrument import Instrument, picked, with_parameters
 from piazzi.earth.sensors.text import AXES, length, names
 from piazzi.earth.sensors.turning import Spin
 from piazzi.earth.tabulated import Rotation
@@ -63,8 +63,9 @@ def position(
     measured = {f"position_{a}": p for a, p in zip(AXES, place, strict=True)}
     measured |= {f"velocity_{a}": v for a, v in zip(AXES, speed, strict=True)} if velocity else {}
     for component, value in measured.items():
-        equations[component], own, needs = biased(value, component, biases)
-        numbers |= own
+        text, own, needs = picked(f"{component}_bias", biases)
+        equations[component] = f"{value} + {component}_bias{text}"
+        numbers |= own | {f"{component}_bias": 0.0}
         roles |= needs
     units = {component: "m" if component.startswith("position") else "m/s" for component in equations}
     numbers, roles = with_parameters(numbers, roles, parameters)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from piazzi.earth.sensors.instrument import Instrument, one_of
-from piazzi.earth.sensors.light import PATHS, TAGS
+from piazzi.earth.sensors.instrument import Instrument
 from piazzi.earth.sensors.ray import ray_of
 from piazzi.earth.stations import Station
 
@@ -54,11 +53,8 @@ def range(  # noqa: A001
     ValueError
         For a path, tag or medium that there is not.
     """
-    one_of(path, PATHS, "path")
-    one_of(tag, TAGS, "tag")
-    ray = ray_of(path, tag, steps, relativity, time_bias, transmitter)
-    ray.media(troposphere, ionosphere, "elevation" in " ".join(visible))
-    total = " + ".join([ray.light.mean, *ray.delays])
+    ray = ray_of(path, tag, steps=steps, relativity=relativity, time_bias=time_bias, transmitter=transmitter)
+    ray.media(troposphere, ionosphere, look="elevation" in " ".join(visible))
     ray.numbers |= {"range_scale": 0.0, "centre_of_mass": 0.0}
-    value = ray.biased(f"(1 + range_scale)*({total} - centre_of_mass)", "range", biases)
+    value = ray.biased(f"(1 + range_scale)*({ray.length} - centre_of_mass)", "range", biases)
     return ray.instrument(name, {"range": value}, parameters, visible, units={"range": "m"}, mapping=mapping)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from piazzi.earth.sensors.air import Air
-from piazzi.earth.sensors.instrument import Instrument, biased, with_parameters
-from piazzi.earth.sensors.light import Light, light, shapiro
+from piazzi.earth.sensors.instrument import Instrument, one_of, picked, with_parameters
+from piazzi.earth.sensors.light import PATHS, TAGS, Light, light, shapiro
 from piazzi.earth.sensors.text import used
 from piazzi.earth.stations import Station
 from piazzi.earth.tabulated import Place
@@ -18,29 +18,46 @@ from piazzi.earth.tabulated import Place
 class Ray:
     """A signal between station and satellite: its light time, media, and the numbers that stations give.
 
-    `instant` is when it is received.
+    `received` is the instant when it is received, `prefix` that of all its names.
     """
 
     light: Light
-    instant: str
+    received: str
+    prefix: str = ""
     makers: dict[str, Any] = field(default_factory=dict)
     delays: list[str] = field(default_factory=list)
     definitions: dict[str, str] = field(default_factory=dict)
     numbers: dict[str, float] = field(default_factory=dict)
     roles: dict[str, str] = field(default_factory=dict)
 
-    def media(self, troposphere: str | None, ionosphere: str | None, look: bool) -> None:
-        """What lies between them, at the elevation from the receiving station, for the mean of the legs."""
+    @property
+    def length(self) -> str:
+        """Mean length of the legs with all delays, m."""
+        return " + ".join([self.light.mean, *self.delays])
+
+    def media(self, troposphere: str | None, ionosphere: str | None, advanced: bool = False, look: bool = False) -> None:
+        """What lies between them, at the elevation from the receiving station, for the mean of the legs.
+
+        `advanced` is whether the ionosphere advances what is measured, as phases and Doppler.
+        """
         if not (troposphere or ionosphere or look):
             return
-        air, leg = Air(), self.light.legs[0]
-        air.look(self.instant, leg.satellite, leg.station)
+        air, leg = Air(self.prefix), self.light.legs[0]
+        air.look(self.received, leg.satellite, leg.station)
         if troposphere:
             self.delays.append(air.troposphere(troposphere))
         if ionosphere:
-            self.delays.append(air.ionosphere(ionosphere, len(self.light.legs)))
+            delay = air.ionosphere(ionosphere, len(self.light.legs))
+            self.delays.append(f"(-{delay})" if advanced else delay)
         self.definitions |= air.definitions
         self.numbers |= air.numbers
+
+    def add(self, other: Ray) -> None:
+        """What another signal needs, beside the own."""
+        self.definitions |= {**other.light.definitions, **other.definitions}
+        self.light = Light(self.light.definitions, {**self.light.roots, **other.light.roots}, self.light.legs)
+        self.numbers |= other.numbers
+        self.makers |= other.makers
 
     def instrument(
         self,
@@ -68,24 +85,41 @@ class Ray:
         )
 
     def biased(self, value: str, component: str, biases: Mapping[str, str] | Sequence[str]) -> str:
-        """A value with its bias."""
-        text, numbers, roles = biased(value, component, biases)
+        """A value with its bias: a number of the station, and parameters of stations or passes."""
+        self.numbers[f"{component}_bias"] = 0.0
+        return f"{value} + {component}_bias{self.picked(f'{component}_bias', biases)}"
+
+    def picked(self, name: str, owners: Mapping[str, str] | Sequence[str]) -> str:
+        """What is added for parameters of stations or passes."""
+        text, numbers, roles = picked(name, owners)
         self.numbers |= numbers
         self.roles |= roles
         return text
 
 
-def ray_of(path: str, tag: str, steps: bool, relativity: bool, time_bias: bool, transmitter: Station | None) -> Ray:
-    """A signal, with its delay by gravity."""
+def ray_of(
+    path: str,
+    tag: str,
+    *,
+    steps: bool = False,
+    relativity: bool = False,
+    time_bias: bool = False,
+    transmitter: Station | None = None,
+    shift: str = "",
+    prefix: str = "",
+) -> Ray:
+    """A signal, with its delay by gravity; `shift` is the text of what is added to times of rows."""
+    one_of(path, PATHS, "path")
+    one_of(tag, TAGS, "tag")
     if (path == "three-way") != (transmitter is not None):
         raise ValueError("a three-way signal has a transmitter, and no other has one: give transmitter=earth.Station(...)")
-    function = "transmitter"
-    signal = light(path, tag, shift="- time_bias" if time_bias else "", steps=steps, transmitter=function)
-    tagged = "t - time_bias" if time_bias else "t"
-    received = {"reception": "", "bounce": " + down", "transmission": " + down" if path == "one-way" else " + up + down"}
-    ray = Ray(signal, tagged + received[tag])
+    moved = " ".join([shift, *(["- time_bias"] if time_bias else [])]).strip()
+    signal = light(path, tag, shift=moved, steps=steps, prefix=prefix, transmitter="transmitter")
+    down, up = f" + {prefix}down", f" + {prefix}up"
+    after = {"reception": "", "bounce": down, "transmission": down if path == "one-way" else up + down}
+    ray = Ray(signal, f"t {moved}".strip() + after[tag], prefix)
     if transmitter is not None:
-        ray.makers[function] = Transmitter(transmitter)
+        ray.makers["transmitter"] = Transmitter(transmitter)
     if time_bias:
         ray.numbers["time_bias"] = 0.0
     if relativity:
