@@ -1,7 +1,7 @@
 """The Earth: time scales, its orientation, frames, stations, Sun, Moon and planets."""
 
 from piazzi.earth import media, sensors
-from piazzi.earth.bodies import BODIES, body
+from piazzi.earth.bodies import BODIES, EphemerisWarning, body
 from piazzi.earth.defaults import ForceChoice, default_forces, read_forces
 from piazzi.earth.eop import EOP, EOPTable, EOPWarning, read_eop
 from piazzi.earth.epoch import Epoch
@@ -26,14 +26,16 @@ from piazzi.earth.stations import (
     up_north_east,
 )
 from piazzi.earth.tabulated import Body, Place, Rotation
+from piazzi.earth.thermosphere import Thermosphere
 from piazzi.earth.tides import pole_tide, solid_tide, station_displacement
 from piazzi.earth.weather import Weather
 
 __all__ = [
-    "BODIES", "EOP", "FRAMES", "LASER_SPHERES", "Body", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity", "Epoch",
-    "ForceChoice", "Forces", "Formula", "Gravity", "GravityField", "LaserSphere", "Place", "Rotation", "SpaceWeather",
-    "SpaceWeatherWarning", "Station", "StationList", "StationWarning", "Weather", "azimuth_elevation_range", "body",
-    "default_forces", "geodetic_to_position", "gravity_field", "ilrs_stations", "laser_sphere", "media", "pole_tide",
+    "BODIES", "EOP", "FRAMES", "LASER_SPHERES", "Body", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity",
+    "EphemerisWarning", "Epoch", "ForceChoice", "Forces", "Formula", "Gravity", "GravityField", "LaserSphere", "Place",
+    "Rotation", "SpaceWeather", "SpaceWeatherWarning", "Station", "StationList", "StationWarning", "Thermosphere", "Weather",
+    "azimuth_elevation_range", "body", "default_forces", "geodetic_to_position", "gravity_field", "ilrs_stations",
+    "laser_sphere", "media", "pole_tide",
     "position_to_geodetic", "read_eop", "read_forces", "read_gravity", "read_space_weather", "read_stations", "rotation",
     "rotation_rate", "sensors", "solid_tide", "station_displacement", "transform", "up_north_east", "use_data",
 ]  # fmt: skip

@@ -17,7 +17,9 @@ SOLAR_IRRADIANCE = 1361.0  # at one astronomical unit
 SOLAR_PRESSURE = SOLAR_IRRADIANCE / SPEED_OF_LIGHT
 SUN_RADIUS = 695700e3
 MOON_RADIUS = 1737.4e3
+EARTH_MOMENTUM = 9.8e8  # m^2/s, angular momentum over mass
 LOVE_K2 = 0.30190  # of the solid Earth, that of the permanent tide too
+LOVE_K21, LOVE_K22 = 0.29830 - 0.00144j, 0.30102 - 0.00130j
 
 _DE440 = "JPL DE440; Park et al. 2021, Astron. J. 161, 105"
 # m^3/s^2; of planets with moons, that of the system
@@ -52,6 +54,7 @@ def constants() -> tuple[Constant, ...]:
         Constant("radius of the Earth in EGM2008", egm.radius, "m", egm.source.removeprefix("package, ")),
         Constant("permanent tide in C20", PERMANENT_TIDE, "", "IERS Conventions 2010, eq. 6.14"),
         Constant("spin of the Earth", EARTH_SPIN, "rad/s", "IERS Conventions 2010, table 1.2"),
+        Constant("angular momentum of the Earth over its mass", EARTH_MOMENTUM, "m^2/s", "IERS Conventions 2010, 10.3"),
         *(Constant(f"equatorial radius of {name}", ELLIPSOIDS[name][0], "m", source) for name, source in shapes.items()),
         *(Constant(f"inverse flattening of {name}", 1.0 / ELLIPSOIDS[name][1], "", source) for name, source in shapes.items()),
         Constant("radius of the Earth for tides of stations", RADIUS, "m", tides),
@@ -59,6 +62,13 @@ def constants() -> tuple[Constant, ...]:
         Constant("mass of the Moon over that of the Earth, for tides of stations", MOON_MASS, "", tides),
         *(Constant(f"Love or Shida number {name}", value, "", tides) for name, value in numbers.items()),
         Constant("Love number k2, for the tide's potential", LOVE_K2, "", "IERS Conventions 2010, table 6.3"),
+        *(
+            Constant(
+                f"Love number k2{order}, {part} part, for the tide's potential", value, "", "IERS Conventions 2010, table 6.3"
+            )
+            for order, k in ((1, LOVE_K21), (2, LOVE_K22))
+            for part, value in (("real", k.real), ("imaginary", k.imag))
+        ),
         Constant("solar irradiance at one astronomical unit", SOLAR_IRRADIANCE, "W/m^2", "IAU 2015 resolution B3"),
         Constant("pressure of sunlight at one astronomical unit", SOLAR_PRESSURE, "N/m^2", "irradiance over speed of light"),
         Constant("radius of the Sun", SUN_RADIUS, "m", "IAU 2015 resolution B3"),

@@ -183,6 +183,8 @@ def force_field(name: str, value: Any, folder: Path) -> Any:
     several = "Sequence" in kind
     if isinstance(value, str):
         word = value.strip()
+        if "bool" in kind and word.lower() in YES:
+            return True
         if several:
             return () if word.lower() in NO else tuple(part.strip() for part in word.split(",") if part.strip())
         if word.lower() in (*NO, *YES) and name != "gravity":

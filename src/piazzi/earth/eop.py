@@ -24,6 +24,7 @@ from piazzi.opening import opened
 Array = np.ndarray[Any, Any]
 
 ARCSEC = np.pi / 648000.0
+SECULAR_POLE = ((0.0550, 0.001677), (0.3205, 0.003460))  # x and y in 2000.0 (") and per year: IERS Conventions, update of 2018
 GROUND_SPEED = 465.0  # m/s that a place on the equator moves: what a second of UT1 costs
 UT1_DRIFT = 1e-3  # s/day by which UT1 may part from its last known rate, from the record since 1962
 

@@ -21,7 +21,7 @@ from piazzi.opening import opened
 
 Array = np.ndarray[Any, Any]
 
-PACKAGED = ("EGM2008",)
+PACKAGED = ("EGM2008", "IERS2010")
 HIGHEST_DEGREE = 2190
 # C20 of a zero-tide field minus that of a tide-free one: A0 H0 k20, IERS Conventions 2010, eq. 6.14, with k20 = 0.30190
 PERMANENT_TIDE = 4.4228e-8 * -0.31460 * 0.30190
@@ -137,6 +137,11 @@ def gravity_field(model: str | Path, folder: Path | None = None) -> GravityField
 @cache
 def _packaged(name: str) -> GravityField:
     import tomllib
+
+    if name == "IERS2010":
+        from piazzi.earth.conventional import conventional
+
+        return conventional(_packaged("EGM2008"))
 
     folder = Path(__file__).parent / "data"
     about = tomllib.loads((folder / f"{name.lower()}.toml").read_text(encoding="utf-8"))

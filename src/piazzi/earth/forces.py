@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
-from piazzi.earth import force_text
+from piazzi.earth import force_air, force_sun, force_text
+from piazzi.earth.atmosphere import HarrisPriester
+from piazzi.earth.bodies import SERIES_ERROR, EphemerisWarning
+from piazzi.earth.celestial import Asteroid, GeodesicPrecession
+from piazzi.earth.constants import GM
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import GravityField, gravity_field
+from piazzi.earth.force_options import UNITS, options, several
 from piazzi.earth.force_text import Force
 from piazzi.earth.gravity import Gravity
 from piazzi.earth.scales import Orientation
 from piazzi.earth.tabulated import Body, Rotation
+from piazzi.earth.tidal_harmonics import TidalHarmonics
 from piazzi.model import Model, Parameter, Sensor
 from piazzi.model.pruning import used_definitions
 from piazzi.text import nearest
 
 STATES = ("x", "y", "z", "vx", "vy", "vz")
-EMPIRICAL = ("radial", "along", "cross")
 _GROUPS = {"position": STATES[:3], "velocity": STATES[3:]}
 _UNITS = dict.fromkeys(STATES[:3], "m") | dict.fromkeys(STATES[3:], "m/s")
-_UNIT = {"cr_a_m": "m^2/kg", "cd_a_m": "m^2/kg", "air_density": "kg/m^3", "air_height": "m", "air_scale": "m"}
 _ANY = Epoch.at(0.0)  # signatures are the same whatever the date
 
 
@@ -32,18 +37,25 @@ class Forces:
     """The forces on a satellite of the Earth, whose states are x, y, z (m) and vx, vy, vz (m/s) on the axes of the GCRF.
 
     Each but gravity has a parameter, ``NAME_on`` of `values`, that is 1, and 0 without it; nothing is compiled for that.
+    About the Sun axes are those of the ICRF, and times of the problem are seconds of TDB.
 
     Parameters
     ----------
     gravity : name of a field, a file, or a `GravityField`
     degree, gradient_degree : as `Gravity` takes them
-    bodies : sun, moon and planets that draw the satellite
-    relativity : Schwarzschild's term
-    radiation : "cannonball", sunlight with the shadow of the Earth on a sphere of `cr_a_m` (m2/kg), or False
-    drag : "exponential", air that turns with the Earth on a sphere of `cd_a_m` (m2/kg), or False
-    air_height : m, about which the density is right
-    tides : ("solid",), the tide of degree 2 that Sun and Moon raise in the Earth, or ()
-    empirical : any of "radial", "along" and "cross", constants (m/s2) that are parameters; "constant" is all of them
+    bodies : sun, moon and planets that draw the satellite; default Sun and Moon, about the Sun all planets and the Moon
+    relativity : any of "schwarzschild", "lense-thirring" and "de-sitter"; True is the first of them, False none
+    radiation : "cannonball", sunlight on a sphere of `cr_a_m` (m2/kg), or False
+    shadows : "earth" and "moon", those that it has
+    drag : "exponential", "harris-priester" or "msis", air that turns with the Earth on a sphere of `cd_a_m` (m2/kg), or False
+    air_height : m, about which the density is right where it is exponential
+    tides : any of "solid", what Sun and Moon raise in the Earth with one Love number; "k1", what those by order and frequency
+        add to it; "pole", what the pole's motion does
+    empirical : "constant", accelerations (m/s2) along R, T and N that are parameters, "once-per-rev", those that go with sine
+        and cosine of the argument of latitude, or names of single ones
+    about : "earth" or "sun"
+    nongravitational : any of "A1", "A2", "A3" (m/s2 at one astronomical unit), about the Sun
+    asteroids : those that draw the body, about the Sun; they need a kernel of their own
 
     Raises
     ------
@@ -54,56 +66,65 @@ class Forces:
     gravity: str | Path | GravityField = "EGM2008"
     degree: int | None = 20
     gradient_degree: int | None = None
-    bodies: Sequence[str] = ("sun", "moon")
-    relativity: bool = True
+    bodies: Sequence[str] | None = None
+    relativity: bool | Sequence[str] = True
     radiation: Literal["cannonball", False] = False
-    drag: Literal["exponential", False] = False
+    drag: Literal["exponential", "harris-priester", "msis", False] = False
     air_height: float = 400e3
-    tides: Sequence[str] = ("solid",)
+    tides: Sequence[str] | None = None
     empirical: Sequence[str] = ()
+    shadows: Sequence[str] | None = None
+    about: Literal["earth", "sun"] = "earth"
+    nongravitational: Sequence[str] = ()
+    asteroids: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        for name, known in (("bodies", force_text.BODIES), ("tides", ("solid",)), ("empirical", (*EMPIRICAL, "constant"))):
-            given = getattr(self, name)
-            if isinstance(given, str):
-                raise ValueError(f"{name} is {given!r}; it must be a list, such as [{given!r}]")
-            for one in given:
-                if one not in known:
-                    raise ValueError(f"{name} has {one!r}; there are {', '.join(known)}{nearest(one, known)}")
-            object.__setattr__(self, name, tuple(dict.fromkeys(given)))
-        if "constant" in self.empirical:
-            object.__setattr__(self, "empirical", EMPIRICAL)
-        for name, only in (("radiation", "cannonball"), ("drag", "exponential")):
-            if getattr(self, name) not in (False, None, "", only):
-                raise ValueError(f"{name} is {getattr(self, name)!r}; it must be {only!r} or False")
-        Gravity(self.field, self.degree, self.gradient_degree)  # what is wrong with it is said here
+        for name in options(self.about):
+            object.__setattr__(self, name, several(self.about, name, getattr(self, name)))
+        for name, only in (("radiation", ("cannonball",)), ("drag", force_air.DENSITIES)):
+            given = getattr(self, name) or False
+            if given and (given not in only or self.about == "sun"):
+                choice = " or ".join([*(map(repr, only) if self.about == "earth" else ()), "False"])
+                raise ValueError(f"{name} is {given!r}; it must be {choice}{' about the Sun' * (self.about == 'sun')}")
+        if self.about == "earth":
+            Gravity(self.field, self.degree, self.gradient_degree)  # what is wrong with it is said here
         self.parts  # noqa: B018
 
     @cached_property
     def field(self) -> GravityField:
         """The field; with the tides of the solid Earth, without the permanent one, which is among them."""
         found = self.gravity if isinstance(self.gravity, GravityField) else gravity_field(self.gravity)
-        return found.in_tide_system("tide_free") if self.tides else found
+        return found.in_tide_system("tide_free") if "solid" in (self.tides or ()) else found
 
     @cached_property
     def parts(self) -> tuple[Force, ...]:
         """The forces as text, without numbers of the field: another one compiles nothing."""
-        empirical = tuple(name for name in EMPIRICAL if name in self.empirical)
+        has = self.relativity, self.tides, self.bodies
+        relativity, tides, bodies = (cast("tuple[str, ...]", group) for group in has)
+        if self.about == "sun":
+            asteroids = {name: force_sun.ASTEROIDS[name] for name in self.asteroids}
+            return force_sun.parts(bodies, asteroids, bool(relativity), self.nongravitational)
+        fixed = [force_text.degree_2(kind) for kind in ("k1", "pole") if kind in tides]
         return (
-            force_text.gravity(),
-            *(force_text.third_body(name) for name in self.bodies),
-            *(force_text.solid_tide(name) for name in ("sun", "moon") if self.tides),
-            *([force_text.relativity()] if self.relativity else []),
-            *([force_text.radiation()] if self.radiation else []),
-            *([force_text.drag(self.air_height)] if self.drag else []),
-            *([force_text.empirical(empirical)] if empirical else []),
+            force_text.gravity(fixed),
+            *(force_text.third_body(name, GM[name]) for name in bodies),
+            *(force_text.solid_tide(name) for name in ("sun", "moon") if "solid" in tides),
+            *fixed,
+            *([force_text.schwarzschild(GM["earth"])] if "schwarzschild" in relativity else []),
+            *([force_text.lense_thirring()] if "lense-thirring" in relativity else []),
+            *([force_text.de_sitter()] if "de-sitter" in relativity else []),
+            *([force_text.radiation(self.shadows or ())] if self.radiation else []),
+            *([force_air.drag(self.drag, self.air_height)] if self.drag else []),
+            *([force_text.empirical(self.empirical)] if self.empirical else []),
         )
 
     @property
     def places(self) -> tuple[str, ...]:
         """The bodies whose places are needed."""
-        also = (("sun", "moon") if self.tides else ()) + (("sun",) if self.radiation else ())
-        return tuple(dict.fromkeys((*self.bodies, *also)))
+        light = bool(self.radiation) or self.drag == "harris-priester"
+        moon = bool(self.radiation) and "moon" in (self.shadows or ())
+        also = ("sun", "moon") if "solid" in (self.tides or ()) else ("sun",) * light + ("moon",) * moon
+        return tuple(dict.fromkeys((*(self.bodies or ()), *also, *self.asteroids)))
 
     @cached_property
     def definitions(self) -> dict[str, str]:
@@ -122,7 +143,8 @@ class Forces:
         for i, axis in enumerate("xyz"):
             terms: dict[str, list[str]] = {}
             for part in self.parts:
-                terms.setdefault(part.switch, []).append(part.acceleration[i])
+                if not part.fixed:
+                    terms.setdefault(part.switch, []).append(part.acceleration[i])
             sums[f"v{axis}"] = " + ".join(
                 " + ".join(of) if not switch else f"{switch}*({' + '.join(of)})" for switch, of in terms.items()
             )
@@ -182,10 +204,17 @@ class Forces:
             _GROUPS,
             _UNITS,
             definitions={**used_definitions(self.definitions, texts), **(definitions or {})},
-            functions={**self.functions(_ANY), **called, **(functions or {})},
+            functions={**self._functions(_ANY), **called, **(functions or {})},
         )
 
-    def functions(self, epoch: Epoch, eop: Orientation | None = None, kernel: str | Path | None = None) -> dict[str, Any]:
+    def functions(
+        self,
+        epoch: Epoch,
+        eop: Orientation | None = None,
+        kernel: str | Path | None = None,
+        asteroids: str | Path | None = None,
+        air: Any = None,
+    ) -> dict[str, Any]:
         """The data of a problem whose time zero is `epoch`.
 
         Parameters
@@ -193,16 +222,52 @@ class Forces:
         epoch : or what one is made of; a field that changes is that of this date
         eop : orientation of the Earth; default the tables of the IERS
         kernel : of JPL, for the bodies; default the series
+        asteroids : kernel of the asteroids
+        air : with ``drag="msis"`` an `earth.Thermosphere`
+
+        Raises
+        ------
+        ValueError
+            Where there is no kernel of the asteroids, or no air.
         """
-        epoch = Epoch(epoch)
-        return {
+        if self.asteroids and asteroids is None:
+            raise ValueError(f"{', '.join(self.asteroids)}: places of asteroids come from a kernel; give asteroids=")
+        if self.drag == "msis" and air is None:
+            raise ValueError(
+                "drag 'msis' needs air=earth.Thermosphere(...): space weather and an orbit about which it is wanted"
+            )
+        if self.about == "sun" and kernel is None and self.bodies:
+            off = ", ".join(f"{name} {SERIES_ERROR[name]} km" for name in self.bodies)
+            warnings.warn(
+                f"places of planets by series are off by up to {off}: give kernel=, a file of JPL such as de440s.bsp",
+                EphemerisWarning,
+                stacklevel=2,
+            )
+        return self._functions(Epoch(epoch), eop, kernel, asteroids, air)
+
+    def _functions(self, epoch: Epoch, *data: Any) -> dict[str, Any]:
+        """As `functions`; without data what has the same signatures."""
+        eop, kernel, asteroids, air = data or (None, None, "", force_air.NOWHERE)
+        names = [name for name in self.places if name not in self.asteroids]
+        if self.about == "sun":
+            return {
+                **{name: Body(name, epoch, kernel, "sun", "TDB") for name in names},
+                **{name: Asteroid(force_sun.NUMBERS[name], epoch, asteroids) for name in self.asteroids},
+            }
+        recipes: dict[str, Any] = {
             "field": Gravity(self.field.at(epoch), self.degree, self.gradient_degree),
             "fixed": Rotation("GCRF", "ITRF", epoch, eop),
             "free": Rotation("ITRF", "GCRF", epoch, eop),
-            **{name: Body(name, epoch, kernel) for name in self.places},
+            **{name: Body(name, epoch, kernel) for name in names},
+            **{f"{kind}_tide": TidalHarmonics(kind, epoch, eop) for kind in ("k1", "pole") if kind in (self.tides or ())},
         }
+        if "de-sitter" in cast("tuple[str, ...]", self.relativity):
+            recipes["geodesic"] = GeodesicPrecession(epoch)
+        if self.drag in ("harris-priester", "msis"):
+            recipes["air"] = HarrisPriester() if self.drag == "harris-priester" else air
+        return recipes
 
 
 def unit_of(name: str) -> str:
     """The unit of a parameter of forces, "" for none."""
-    return "m/s^2" if name in EMPIRICAL else _UNIT.get(name, "")
+    return UNITS.get(name, "")

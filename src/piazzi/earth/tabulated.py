@@ -8,7 +8,7 @@ where the rate of UT1 steps (by 1e-14 rad/s at the most).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import floor
 from pathlib import Path
@@ -18,7 +18,7 @@ import numpy as np
 
 from piazzi.earth import scales
 from piazzi.earth.bodies import body
-from piazzi.earth.epoch import Epoch
+from piazzi.earth.epoch import Epoch, pairs
 from piazzi.earth.rotation import FRAMES, frame_named, rotation
 from piazzi.earth.scales import Orientation
 from piazzi.earth.stations import Station
@@ -44,11 +44,17 @@ class _Daily(Protocol):
 
 
 class Tabulated:
-    """What tables over time have in common; `columns` is the signature of the table, which calls may wrap."""
+    """What functions made of tables over time have in common; they give the `COLUMNS` of one at a time `t`."""
 
     TERMS: ClassVar[int] = 10
     LENGTH: ClassVar[float] = DAY
+    COLUMNS: ClassVar[int] = 3
     epoch: Epoch
+
+    @property
+    def signature(self) -> Signature:
+        """The form of the function."""
+        return Signature.of_table(self.COLUMNS, self.TERMS)
 
     @property
     def span(self) -> None:
@@ -67,10 +73,15 @@ class Tabulated:
         """The data for these times, as kernels read them."""
         return self.pieces(first, last).block
 
-    def _columns(self, t: float, count: int) -> tuple[Array, Array]:
-        """The columns of the table and their time derivatives at `t`, by the function that kernels compile."""
-        table, data = Signature.of_table(count, self.TERMS), self.block(t, t)
-        return np.array(value(table, data, t)), derivatives(table, data, t)[:, 0]
+    def value(self, *t: float) -> tuple[float, ...]:
+        """The columns at `t`."""
+        check_count(self.signature, t)
+        return value(self.signature, self.block(*t, *t), *t)
+
+    def derivatives(self, *t: float) -> Array:
+        """The rates of the columns at `t`, (columns, 1)."""
+        check_count(self.signature, t)
+        return derivatives(self.signature, self.block(*t, *t), *t)
 
 
 def _of_day(epoch: Epoch) -> tuple[float, float]:
@@ -140,7 +151,9 @@ class Rotation(Tabulated):
 
     def matrix(self, t: float) -> tuple[Array, Array]:
         """The matrix and its time derivative."""
-        R, rate = (a.reshape(3, 3) for a in self._columns(t, 9))
+        table, data = Signature.of_table(9, self.TERMS), self.block(t, t)
+        R = np.array(value(table, data, t)).reshape(3, 3)
+        rate = derivatives(table, data, t).reshape(3, 3)
         return (R.T, rate.T) if self.signature.transposed else (R, rate)
 
     def value(self, *arguments: float) -> tuple[float, ...]:
@@ -165,41 +178,29 @@ class Body(Tabulated):
     epoch : the instant of t = 0, that of the problem
     kernel : a kernel of JPL; default the series
     center : the body that it is seen from
+    scale : "TT" or "TDB", whose seconds `t` counts
     """
 
     name: str
     epoch: Epoch
     kernel: str | Path | None = None
     center: str = "earth"
+    scale: str = "TT"
 
     def __post_init__(self) -> None:
         if self.kernel is None:
             body(self.name, self.epoch, self.center)
 
-    @property
-    def signature(self) -> Signature:
-        """The form of the function."""
-        return Signature.of_table(3, self.TERMS)
-
     @cached_property
     def checksum(self) -> str:
         """Hash of what the table is."""
         where = None if self.kernel is None else str(self.kernel)
-        return checksum("body", self.name, self.center, where, self.epoch.whole, self.epoch.fraction)
+        return checksum("body", self.name, self.center, where, self.epoch.whole, self.epoch.fraction, self.scale)
 
     def at(self, epochs: list[Epoch]) -> Array:
         """Positions at instants, (K, 3)."""
+        epochs = in_tdb(self.epoch, epochs) if self.scale == "TDB" else epochs
         return body(self.name, epochs, self.center, self.kernel)[0]
-
-    def value(self, *t: float) -> tuple[float, ...]:
-        """The position at `t`."""
-        check_count(self.signature, t)
-        return tuple(self._columns(t[0], 3)[0].tolist())
-
-    def derivatives(self, *t: float) -> Array:
-        """The velocity at `t`, (3, 1)."""
-        check_count(self.signature, t)
-        return self._columns(t[0], 3)[1][:, None]
 
 
 @dataclass(frozen=True)
@@ -218,12 +219,12 @@ class Place(Tabulated):
 
     TERMS: ClassVar[int] = STATION_TERMS
     LENGTH: ClassVar[float] = DAY / 6
+    COLUMNS: ClassVar[int] = 6
 
     station: Station
     epoch: Epoch
     eop: Orientation | None = None
     tides: bool = True
-    signature: Signature = field(default=Signature.of_station(), init=False, repr=False)
 
     @cached_property
     def checksum(self) -> str:
@@ -247,15 +248,12 @@ class Place(Tabulated):
         zero = np.zeros(6)
         return Pieces(places.start, places.length, np.concatenate([c, rates], axis=2), zero, zero)
 
-    def value(self, *t: float) -> tuple[float, ...]:
-        """Position and velocity at `t`."""
-        check_count(self.signature, t)
-        return tuple(self._columns(t[0], 6)[0].tolist())
 
-    def derivatives(self, *t: float) -> Array:
-        """Velocity and acceleration at `t`, (6, 1)."""
-        check_count(self.signature, t)
-        return self._columns(t[0], 6)[1][:, None]
+def in_tdb(start: Epoch, epochs: list[Epoch]) -> list[Epoch]:
+    """Instants that are as many seconds of TDB past the first as these are of TT."""
+    whole, fraction = pairs([start, *epochs])
+    behind = scales.offset("TDB", whole, fraction)  # TT - TDB, whose own change within it is nothing
+    return [epoch + float(shift) for epoch, shift in zip(epochs, behind[1:] - behind[0], strict=True)]
 
 
 def orientation_key(eop: Orientation | None) -> Iterable[Any]:

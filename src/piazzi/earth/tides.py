@@ -13,7 +13,7 @@ import numpy as np
 
 from piazzi.earth import scales
 from piazzi.earth.bodies import body
-from piazzi.earth.eop import ARCSEC, decimal_year, tables
+from piazzi.earth.eop import ARCSEC, SECULAR_POLE, decimal_year, tables
 from piazzi.earth.epoch import Epoch, pairs
 from piazzi.earth.rotation import rotation
 from piazzi.earth.scales import Orientation
@@ -157,11 +157,7 @@ def pole_tide(position: Array, epoch: Epoch | Iterable[Epoch], eop: Orientation 
 
     Eq. 7.26 of the IERS Conventions 2010 with the secular pole of their update of 2018.
     """
-    whole, fraction = pairs(epoch)
-    pole = (tables() if eop is None else eop).pole(whole, fraction).values / ARCSEC
-    years = decimal_year(whole) - 2000.0
-    m1 = pole[..., 0] - (0.0550 + 0.001677 * years)
-    m2 = -(pole[..., 1] - (0.3205 + 0.003460 * years))
+    m1, m2 = wobble(epoch, eop)
     r = np.asarray(position, dtype=float)
     longitude = np.arctan2(r[..., 1], r[..., 0])
     sp, cp = (value / np.linalg.norm(r, axis=-1) for value in (r[..., 2], np.hypot(r[..., 0], r[..., 1])))
@@ -173,3 +169,12 @@ def pole_tide(position: Array, epoch: Epoch | Iterable[Epoch], eop: Orientation 
     return np.stack([
         (up * cp - north * sp) * cl - east * sl, (up * cp - north * sp) * sl + east * cl, up * sp + north * cp,
     ], -1)  # fmt: skip
+
+
+def wobble(epoch: Epoch | Iterable[Epoch], eop: Orientation | None = None) -> tuple[Array, Array]:
+    """The pole's place beside its secular one, m1 and m2 in seconds of arc; eq. 7.24 with the update of 2018."""
+    whole, fraction = pairs(epoch)
+    pole = (tables() if eop is None else eop).pole(whole, fraction).values / ARCSEC
+    years = decimal_year(whole) - 2000.0
+    (x, x_rate), (y, y_rate) = SECULAR_POLE
+    return pole[..., 0] - (x + x_rate * years), -(pole[..., 1] - (y + y_rate * years))

@@ -12,33 +12,13 @@ from piazzi.earth.epoch import Epoch
 from piazzi.earth.rotation import frame_named, rotation_rate
 from piazzi.earth.scales import Orientation
 from piazzi.earth.tabulated import DAY, Tabulated, orientation_key
-from piazzi.model.functions import Signature
-from piazzi.outside.evaluation import check_count, checksum
+from piazzi.outside.evaluation import checksum
 
 Array = np.ndarray[Any, Any]
 
 
-class _Vector(Tabulated):
-    """A vector over time: ``(t)`` to three."""
-
-    @property
-    def signature(self) -> Signature:
-        """The form of the function."""
-        return Signature.of_table(3, self.TERMS)
-
-    def value(self, *t: float) -> tuple[float, ...]:
-        """The vector at `t`."""
-        check_count(self.signature, t)
-        return tuple(self._columns(t[0], 3)[0].tolist())
-
-    def derivatives(self, *t: float) -> Array:
-        """Its derivative, (3, 1)."""
-        check_count(self.signature, t)
-        return self._columns(t[0], 3)[1][:, None]
-
-
 @dataclass(frozen=True)
-class Spin(_Vector):
+class Spin(Tabulated):
     """Angular velocity of axes, rad/s along the axes of the GCRF.
 
     Parameters
@@ -70,7 +50,7 @@ class Spin(_Vector):
 
 
 @dataclass(frozen=True)
-class EarthVelocity(_Vector):
+class EarthVelocity(Tabulated):
     """Velocity of the Earth about the Sun's system, m/s along the axes of the GCRF.
 
     Parameters

@@ -1,0 +1,65 @@
+"""What the forces may be given, about the Earth and about the Sun."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from piazzi.earth import force_sun, force_text
+from piazzi.text import nearest
+
+CONSTANT = ("radial", "along", "cross")
+ONCE_PER_REV = tuple(f"{name}_{wave}" for name in CONSTANT for wave in ("sin", "cos"))
+UNITS = {
+    "cr_a_m": "m2/kg", "cd_a_m": "m2/kg", "air_density": "kg/m3", "air_height": "m", "air_scale": "m",
+    **dict.fromkeys((*CONSTANT, *ONCE_PER_REV, *force_sun.NONGRAVITATIONAL), "m/s2"),
+}  # fmt: skip
+_RELATIVITY = ("schwarzschild", "lense-thirring", "de-sitter")
+_TIDES = ("solid", "k1", "pole")
+_SHADOWS = ("earth", "moon")
+_KNOWN: dict[str, dict[str, tuple[str, ...]]] = {
+    "earth": {
+        "bodies": force_text.BODIES,
+        "tides": _TIDES,
+        "relativity": _RELATIVITY,
+        "shadows": _SHADOWS,
+        "empirical": ("constant", "once-per-rev", *CONSTANT, *ONCE_PER_REV),
+        "nongravitational": (),
+        "asteroids": (),
+    },
+    "sun": {
+        "bodies": force_sun.BODIES,
+        "tides": (),
+        "relativity": _RELATIVITY[:1],
+        "shadows": (),
+        "empirical": (),
+        "nongravitational": force_sun.NONGRAVITATIONAL,
+        "asteroids": tuple(force_sun.ASTEROIDS),
+    },
+}
+_DEFAULT: dict[str, dict[str, tuple[str, ...]]] = {
+    "earth": {"bodies": ("sun", "moon"), "tides": ("solid",), "shadows": ("earth",)},
+    "sun": {"bodies": force_sun.BODIES, "tides": (), "shadows": ()},
+}
+
+
+def options(about: str) -> tuple[str, ...]:
+    """The names of the options that are lists; raises ValueError for another centre."""
+    if about not in _KNOWN:
+        raise ValueError(f"about is {about!r}; it must be 'earth' or 'sun'")
+    return tuple(_KNOWN[about])
+
+
+def several(about: str, name: str, given: bool | Sequence[str] | None) -> tuple[str, ...]:
+    """What was given of a list, each once and in full; raises ValueError for what there is not."""
+    known = _KNOWN[about][name]
+    given = _DEFAULT[about][name] if given is None else known[:1] if given is True else given or ()
+    if isinstance(given, str):
+        raise ValueError(f"{name} is {given!r}; it must be a list, such as [{given!r}]")
+    for one in given:
+        if one not in known:
+            there = f"there are {', '.join(known)}" if known else f"there are none about the {about.title()}"
+            raise ValueError(f"{name} has {one!r}; {there}{nearest(one, known)}")
+    groups = {"constant": CONSTANT, "once-per-rev": ONCE_PER_REV}
+    full = [each for one in given for each in groups.get(one, (one,))]
+    ordered = sorted(full, key=(*CONSTANT, *ONCE_PER_REV).index) if name == "empirical" else full
+    return tuple(dict.fromkeys(ordered))
