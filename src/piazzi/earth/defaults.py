@@ -16,7 +16,7 @@ from piazzi.earth.constants import GM
 from piazzi.earth.eop import EOP, read_eop
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.finding import check_kernel
-from piazzi.earth.forces import EMPIRICAL, Forces
+from piazzi.earth.forces import Forces
 from piazzi.earth.scales import Orientation
 from piazzi.earth.tides import RADIUS
 from piazzi.opening import opened
@@ -48,7 +48,7 @@ class ForceChoice:
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        usual = {"cr_a_m": REFLECTED, "cd_a_m": DRAGGED} | dict.fromkeys(EMPIRICAL, 0.0)
+        usual = {"cr_a_m": REFLECTED, "cd_a_m": DRAGGED}
         known = self.forces.parameters
         for name in self.values:
             if name not in known:

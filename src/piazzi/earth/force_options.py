@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from piazzi.earth import force_sun, force_text
 from piazzi.text import nearest
 
+USUAL = ("usual",)
 CONSTANT = ("radial", "along", "cross")
 ONCE_PER_REV = tuple(f"{name}_{wave}" for name in CONSTANT for wave in ("sin", "cos"))
 UNITS = {
@@ -49,10 +50,10 @@ def options(about: str) -> tuple[str, ...]:
     return tuple(_KNOWN[about])
 
 
-def several(about: str, name: str, given: bool | Sequence[str] | None) -> tuple[str, ...]:
+def several(about: str, name: str, given: bool | Sequence[str]) -> tuple[str, ...]:
     """What was given of a list, each once and in full; raises ValueError for what there is not."""
     known = _KNOWN[about][name]
-    given = _DEFAULT[about][name] if given is None else known[:1] if given is True else given or ()
+    given = _DEFAULT[about][name] if given == USUAL else known[:1] if given is True else given or ()
     if isinstance(given, str):
         raise ValueError(f"{name} is {given!r}; it must be a list, such as [{given!r}]")
     for one in given:

@@ -16,7 +16,7 @@ from piazzi.earth.celestial import Asteroid, GeodesicPrecession
 from piazzi.earth.constants import GM
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import GravityField, gravity_field
-from piazzi.earth.force_options import UNITS, options, several
+from piazzi.earth.force_options import UNITS, USUAL, options, several
 from piazzi.earth.force_text import Force
 from piazzi.earth.gravity import Gravity
 from piazzi.earth.scales import Orientation
@@ -66,14 +66,14 @@ class Forces:
     gravity: str | Path | GravityField = "EGM2008"
     degree: int | None = 20
     gradient_degree: int | None = None
-    bodies: Sequence[str] | None = None
+    bodies: Sequence[str] = USUAL
     relativity: bool | Sequence[str] = True
     radiation: Literal["cannonball", False] = False
     drag: Literal["exponential", "harris-priester", "msis", False] = False
     air_height: float = 400e3
-    tides: Sequence[str] | None = None
+    tides: Sequence[str] = USUAL
     empirical: Sequence[str] = ()
-    shadows: Sequence[str] | None = None
+    shadows: Sequence[str] = USUAL
     about: Literal["earth", "sun"] = "earth"
     nongravitational: Sequence[str] = ()
     asteroids: Sequence[str] = ()
@@ -94,13 +94,12 @@ class Forces:
     def field(self) -> GravityField:
         """The field; with the tides of the solid Earth, without the permanent one, which is among them."""
         found = self.gravity if isinstance(self.gravity, GravityField) else gravity_field(self.gravity)
-        return found.in_tide_system("tide_free") if "solid" in (self.tides or ()) else found
+        return found.in_tide_system("tide_free") if "solid" in self.tides else found
 
     @cached_property
     def parts(self) -> tuple[Force, ...]:
         """The forces as text, without numbers of the field: another one compiles nothing."""
-        has = self.relativity, self.tides, self.bodies
-        relativity, tides, bodies = (cast("tuple[str, ...]", group) for group in has)
+        relativity, tides, bodies = cast("tuple[str, ...]", self.relativity), self.tides, self.bodies
         if self.about == "sun":
             asteroids = {name: force_sun.ASTEROIDS[name] for name in self.asteroids}
             return force_sun.parts(bodies, asteroids, bool(relativity), self.nongravitational)
@@ -113,7 +112,7 @@ class Forces:
             *([force_text.schwarzschild(GM["earth"])] if "schwarzschild" in relativity else []),
             *([force_text.lense_thirring()] if "lense-thirring" in relativity else []),
             *([force_text.de_sitter()] if "de-sitter" in relativity else []),
-            *([force_text.radiation(self.shadows or ())] if self.radiation else []),
+            *([force_text.radiation(self.shadows)] if self.radiation else []),
             *([force_air.drag(self.drag, self.air_height)] if self.drag else []),
             *([force_text.empirical(self.empirical)] if self.empirical else []),
         )
@@ -122,9 +121,9 @@ class Forces:
     def places(self) -> tuple[str, ...]:
         """The bodies whose places are needed."""
         light = bool(self.radiation) or self.drag == "harris-priester"
-        moon = bool(self.radiation) and "moon" in (self.shadows or ())
-        also = ("sun", "moon") if "solid" in (self.tides or ()) else ("sun",) * light + ("moon",) * moon
-        return tuple(dict.fromkeys((*(self.bodies or ()), *also, *self.asteroids)))
+        moon = bool(self.radiation) and "moon" in self.shadows
+        also = ("sun", "moon") if "solid" in self.tides else ("sun",) * light + ("moon",) * moon
+        return tuple(dict.fromkeys((*self.bodies, *also, *self.asteroids)))
 
     @cached_property
     def definitions(self) -> dict[str, str]:
@@ -259,7 +258,7 @@ class Forces:
             "fixed": Rotation("GCRF", "ITRF", epoch, eop),
             "free": Rotation("ITRF", "GCRF", epoch, eop),
             **{name: Body(name, epoch, kernel) for name in names},
-            **{f"{kind}_tide": TidalHarmonics(kind, epoch, eop) for kind in ("k1", "pole") if kind in (self.tides or ())},
+            **{f"{kind}_tide": TidalHarmonics(kind, epoch, eop) for kind in ("k1", "pole") if kind in self.tides},
         }
         if "de-sitter" in cast("tuple[str, ...]", self.relativity):
             recipes["geodesic"] = GeodesicPrecession(epoch)
