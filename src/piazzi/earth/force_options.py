@@ -11,8 +11,8 @@ USUAL = ("usual",)
 CONSTANT = ("radial", "along", "cross")
 ONCE_PER_REV = tuple(f"{name}_{wave}" for name in CONSTANT for wave in ("sin", "cos"))
 UNITS = {
-    "cr_a_m": "m2/kg", "cd_a_m": "m2/kg", "air_density": "kg/m3", "air_height": "m", "air_scale": "m",
-    **dict.fromkeys((*CONSTANT, *ONCE_PER_REV, *force_sun.NONGRAVITATIONAL), "m/s2"),
+    "cr_a_m": "m^2/kg", "cd_a_m": "m^2/kg", "air_density": "kg/m^3", "air_height": "m", "air_scale": "m",
+    **dict.fromkeys((*CONSTANT, *ONCE_PER_REV, *force_sun.NONGRAVITATIONAL), "m/s^2"),
 }  # fmt: skip
 _RELATIVITY = ("schwarzschild", "lense-thirring", "de-sitter")
 _TIDES = ("solid", "k1", "pole")
