@@ -106,17 +106,15 @@ def test_without_a_kernel_the_error_of_the_series_is_said():
 
 
 def test_ceres_of_1801_goes_where_jpl_has_it(data_dir):
-    """Over 400 days, from JPL's own state: what the planets do is 10 000 km and more."""
+    """Over 400 days, from JPL's own state: 66 km of places of planets by series, 213 000 km without planets."""
     path = data_dir / "earth" / "ceres-1801" / "ANSWER_ceres_heliocentric_jpl_sb441.csv"
     rows = np.genfromtxt(path, delimiter=",", skip_header=1)
     first, last = rows[0], rows[400]
     epoch = pz.Epoch.from_jd(first[0], 0.0, "TDB")
-    missed = {}
-    for bodies in ((), None):
-        forces = earth.Forces(about="sun", bodies=bodies)
-        p = problem(forces, first[1:] * 1e3, epoch)
-        p = replace(p, integrator=pz.RungeKutta8(60))
+    missed = []
+    for forces in (earth.Forces(about="sun", bodies=()), earth.Forces(about="sun")):
+        p = replace(problem(forces, first[1:] * 1e3, epoch), integrator=pz.RungeKutta8(40))
         end = p.step(first[1:] * 1e3, 86400.0 * 400, 0.0)[0]
-        missed[bodies] = np.linalg.norm(end[:3] - last[1:4] * 1e3)
-    assert missed[()] > 1e7
-    assert missed[None] < 2e5
+        missed.append(np.linalg.norm(end[:3] - last[1:4] * 1e3))
+    assert missed[0] > 2e8
+    assert missed[1] < 1e5

@@ -81,6 +81,7 @@ class Forces:
     def __post_init__(self) -> None:
         for name in options(self.about):
             object.__setattr__(self, name, several(self.about, name, getattr(self, name)))
+        object.__setattr__(self, "relativity", self.relativity or False)
         for name, only in (("radiation", ("cannonball",)), ("drag", force_air.DENSITIES)):
             given = getattr(self, name) or False
             if given and (given not in only or self.about == "sun"):
@@ -99,7 +100,7 @@ class Forces:
     @cached_property
     def parts(self) -> tuple[Force, ...]:
         """The forces as text, without numbers of the field: another one compiles nothing."""
-        relativity, tides, bodies = cast("tuple[str, ...]", self.relativity), self.tides, self.bodies
+        relativity, tides, bodies = cast("tuple[str, ...]", self.relativity or ()), self.tides, self.bodies
         if self.about == "sun":
             asteroids = {name: force_sun.ASTEROIDS[name] for name in self.asteroids}
             return force_sun.parts(bodies, asteroids, bool(relativity), self.nongravitational)
@@ -260,7 +261,7 @@ class Forces:
             **{name: Body(name, epoch, kernel) for name in names},
             **{f"{kind}_tide": TidalHarmonics(kind, epoch, eop) for kind in ("k1", "pole") if kind in self.tides},
         }
-        if "de-sitter" in cast("tuple[str, ...]", self.relativity):
+        if "de-sitter" in cast("tuple[str, ...]", self.relativity or ()):
             recipes["geodesic"] = GeodesicPrecession(epoch)
         if self.drag in ("harris-priester", "msis"):
             recipes["air"] = HarrisPriester() if self.drag == "harris-priester" else air
