@@ -146,7 +146,7 @@ def test_every_package_imported_is_declared():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras, runtime = project["optional-dependencies"], declared(project["dependencies"])
     in_a_notebook = {"IPython"}  # which is there where it is imported
-    in_source = declared(extras["cluster"] + extras["jpl"]) | in_a_notebook
+    in_source = declared(extras["cluster"] + extras["jpl"] + extras["msis"]) | in_a_notebook
     for folder, known in (("src", in_source), ("tests", declared(extras["dev"]))):
         unknown = {name: place for name, place in packages_imported(ROOT / folder).items() if name not in runtime | known}
         assert not unknown, unknown

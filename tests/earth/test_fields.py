@@ -155,5 +155,5 @@ def test_broken_files_are_refused_with_the_place(small, text, message):
 
 
 def test_an_unknown_model_is_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"'EGM84' is neither in the package \(EGM2008\) nor a file"):
+    with pytest.raises(ValueError, match=r"'EGM84' is neither in the package \(EGM2008, IERS2010\) nor a file"):
         gravity_field("EGM84", tmp_path)

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from piazzi.earth.conventional import SOURCE, conventional
 from piazzi.earth.epoch import Epoch
 from piazzi.opening import opened
 
@@ -139,9 +140,11 @@ def _packaged(name: str) -> GravityField:
     import tomllib
 
     if name == "IERS2010":
-        from piazzi.earth.conventional import conventional
-
-        return conventional(_packaged("EGM2008"))
+        egm = _packaged("EGM2008")
+        c, s, rates = conventional(egm.c, egm.s)
+        terms = tuple(Term("trnd", *rate, 2000.0, math.inf, 1.0) for rate in rates)
+        zero_tide = replace(egm, name=name, c=c, s=s, source=f"package, {SOURCE}", terms=terms, tide_system="zero_tide")
+        return zero_tide.in_tide_system("tide_free")
 
     folder = Path(__file__).parent / "data"
     about = tomllib.loads((folder / f"{name.lower()}.toml").read_text(encoding="utf-8"))
