@@ -16,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = Path(__file__).with_name("commands.py")
-EXTRAS = ("cluster", "jpl")  # what a user may ask for beyond what is always there
+EXTRAS = ("cluster", "jpl", "msis")  # what a user may ask for beyond what is always there
 
 
 def parts(requirement: str) -> tuple[str, str, str]:
