@@ -17,7 +17,7 @@ SOURCE = "IERS Conventions 2010, table 6.2"
 
 
 def conventional(c: Array, s: Array) -> tuple[Array, Array, list[tuple[int, int, float, float]]]:
-    """The coefficients of EGM2008 with those of low degree in 2000.0 (C20 zero-tide, C21, S21), and rates per year (n, m, c, s).
+    """The coefficients of EGM2008 with those of low degree in 2000.0 (C20 zero-tide, C21, S21), and rates per year: n, m, c, s.
 
     C20 is that of satellite laser ranging, C21 and S21 are those of the secular pole (eq. 6.5).
     """
