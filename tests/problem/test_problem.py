@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
-from piazzi.problem.problem import MOST_KINDS
+from piazzi.problem.evaluation import MOST_KINDS
 from tests.laws.problems import b612, random_covariance, satellite
 
 NAN, INF = np.nan, np.inf
@@ -302,7 +302,7 @@ def test_whole_number_of_steps_stays_whole():
 
 def test_kernels_that_are_loaded_stay_loaded_however_many_kinds_of_problems_come(monkeypatch):
     """Kinds for which no kernel was wanted are forgotten."""
-    monkeypatch.setattr("piazzi.problem.problem._SPECS", kinds := {})
+    monkeypatch.setattr("piazzi.problem.evaluation._SPECS", kinds := {})
 
     def kind(i):
         model = pz.Model(["x"], [f"-{i}*x"], [pz.Sensor("position", ["x"])])

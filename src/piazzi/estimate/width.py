@@ -32,8 +32,7 @@ def too_wide_message(widest: Array) -> str:
 
 def too_wide(problem: Problem, inputs: Inputs, S: Array) -> bool:
     """Whether innovation covariances (J, m, m) of a filter stand further above the noise than covariances can tell."""
-    least = np.diagonal(problem.station_noise, axis1=1, axis2=2)
-    if S.size and np.fmax.reduce(S, axis=None) <= DIFFUSE * least[least > 0.0].min():  # an upper bound, which costs little
+    if np.fmax.reduce(S, axis=None, initial=0.0) <= DIFFUSE * problem.least_noise:  # an upper bound, which costs little
         return False
     return bool((ratios(problem, inputs, S) > DIFFUSE).any())
 

@@ -17,6 +17,17 @@ from piazzi.model.values import with_values
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.parts import Station
 
+MOST_KINDS = 100  # beyond so many kinds of problem, those are forgotten for which no kernel was wanted
+_SPECS: dict[tuple[Any, ...], dict[tuple[Any, ...], KernelSpec]] = {}
+
+
+def shared_specs(kind: tuple[Any, ...]) -> dict[tuple[Any, ...], KernelSpec]:
+    """Specifications of kernels so far for problems of a kind, to which whoever needs another adds it."""
+    if len(_SPECS) > MOST_KINDS:  # the others stay: what is loaded is found by them, and stays too
+        for idle in [other for other, specs in list(_SPECS.items()) if not specs]:
+            _SPECS.pop(idle, None)
+    return _SPECS.setdefault(kind, {})
+
 
 def _states(model: Model, x: Any, t: Any) -> tuple[Array, Array, bool]:
     """States (K, n), times (K,), and whether one state was given."""

@@ -102,10 +102,9 @@ def prepare(problem: Problem, tracking: Tracking) -> Inputs:
 
 def _check_resolved(problem: Problem, tracking: Tracking, station: Array, z: Array) -> None:
     """Raise ValueError for a measurement whose rounding, as a number, is larger than its noise."""
-    limits = np.array(problem.station_limits)
-    if not limits.size or np.nanmax(np.abs(z)) <= limits.min():
+    if np.fmax.reduce(np.abs(z), axis=None, initial=0.0) <= problem.least_limit:
         return
-    beyond = np.argwhere(np.abs(z) > limits[station])
+    beyond = np.argwhere(np.abs(z) > np.array(problem.station_limits)[station])
     if beyond.size:
         row, i = (int(v) for v in beyond[0])
         where = f"row {row} (t = {tracking.row_times[row]:g} s)"

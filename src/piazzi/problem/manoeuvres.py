@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from piazzi.model import Model
-from piazzi.problem.checks import Array, covariance, finite_vector, numeric
+from piazzi.problem.checks import Array, covariance, finite_vector, frozen, numeric
 from piazzi.problem.parts import Manoeuvre
 from piazzi.text import nearest
 
 SAME = 1e-12
+NONE = frozen([0.0])  # as `packed`
 
 
 def checked(manoeuvres: Manoeuvre | Sequence[Manoeuvre], model: Model) -> tuple[Manoeuvre, ...]:
@@ -56,6 +57,8 @@ def check_after(manoeuvres: Sequence[Manoeuvre], start: float) -> None:
 
 def packed(manoeuvres: Sequence[Manoeuvre], model: Model) -> Array:
     """Their number; then for each its time, the jump of the whole state (n) and its covariance (n, n)."""
+    if not manoeuvres:
+        return NONE
     n = model.n
     out = [np.array([float(len(manoeuvres))])]
     for m in manoeuvres:
@@ -64,4 +67,4 @@ def packed(manoeuvres: Sequence[Manoeuvre], model: Model) -> Array:
         jump[where] = m.delta_v
         spread[np.ix_(where, where)] = m.covariance
         out += [np.array([m.time]), jump, spread.reshape(-1)]
-    return np.concatenate(out)
+    return frozen(np.concatenate(out))

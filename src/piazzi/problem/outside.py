@@ -12,15 +12,17 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from piazzi.kernels.bundle import Given
 from piazzi.model import Model
 from piazzi.model.definitions import TIME, Definitions
 from piazzi.model.functions import STATION_TABLE, Signature, signature_of
 from piazzi.outside.evaluation import aligned, whole_registers
-from piazzi.problem.checks import Array
+from piazzi.problem.checks import Array, frozen
 from piazzi.text import nearest
 
 DAY = 86400.0
 MARGIN = 3600.0  # seconds that a block reaches beyond what is asked for
+NO_DATA = frozen([0.0])
 
 
 class Recipe(Protocol):
@@ -110,6 +112,8 @@ def check_span(spans: Iterable[tuple[str, tuple[float, float]]], first: float, l
 
 def block_of(recipes: Sequence[Recipe], first: float, last: float) -> Array:
     """The block for a span of times."""
+    if not recipes:
+        return NO_DATA
     parts = [np.asarray(recipe.block(first, last), dtype=float) for recipe in recipes]
     ends = np.cumsum([whole_registers(count) for count in (len(recipes), *map(len, parts))])
     block = aligned(max(int(ends[-1]), 1))
@@ -117,3 +121,43 @@ def block_of(recipes: Sequence[Recipe], first: float, last: float) -> Array:
         block[i], block[at : at + len(part)] = at, part
     block.setflags(write=False)
     return block
+
+
+class Told:
+    """What kernels are told of a problem's model: numbers, and data of functions for the times that were asked for so far.
+
+    These are `start` alone where the bundle is wanted before any.
+    """
+
+    def __init__(
+        self, given: Array, manoeuvres: Array, recipes: Sequence[Recipe], spans: Sequence[tuple[str, Any]], start: float
+    ) -> None:
+        self._given, self._manoeuvres, self._recipes, self._spans = given, manoeuvres, recipes, spans
+        self._start = start
+        self._state: tuple[Given, float, float, float, float] | None = None
+
+    @property
+    def bundle(self) -> Given:
+        """Numbers and data; another one whenever more times are asked for."""
+        if self._state is None:
+            self._state = self._made(self._start, self._start)
+        return self._state[0]
+
+    def cover(self, first: float, last: float) -> bool:
+        """Have data for these times (s); True where the bundle is another one.  Raises ValueError where there are none."""
+        if not self._recipes:
+            return False
+        check_span(self._spans, first, last)
+        if self._state is not None:
+            _, begin, end, earliest, latest = self._state
+            if begin <= first <= last <= end:
+                return False
+            first, last = min(first, earliest), max(last, latest)
+        self._state = self._made(first, last)
+        return True
+
+    def _made(self, first: float, last: float) -> tuple[Given, float, float, float, float]:
+        """The bundle, the times that its data reach to, and those that were asked for."""
+        begin, end = days(first, last)
+        data = block_of(self._recipes, begin, end)
+        return Given(parameters=self._given, manoeuvres=self._manoeuvres, data=data), begin, end, first, last

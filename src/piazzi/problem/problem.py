@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
 
-from piazzi.kernels import Discrete, Integrator, Kepler, KernelSpec, RungeKutta4, RungeKutta8
+from piazzi.kernels import Integrator, Kepler, KernelSpec, RungeKutta8
 from piazzi.kernels.bundle import Belief, Given
 from piazzi.kernels.outside import outside_fragments
 from piazzi.model import Model
-from piazzi.model.functions import STATION_TABLE
-from piazzi.problem import evaluation, manoeuvres, outside
+from piazzi.problem import checked, evaluation, layout, manoeuvres, outside
 from piazzi.problem.arcs import Arc, Steps, arc
-from piazzi.problem.checks import Array, check_span, covariance, finite_vector, frozen, lock, numeric
+from piazzi.problem.checks import Array, check_span, finite_vector, lock, numeric
 from piazzi.problem.constants import with_station_constants
 from piazzi.problem.epochs import check_near, epoch_given
-from piazzi.problem.parts import Gaussian, Manoeuvre, ProcessNoise, Station, Truth
+from piazzi.problem.parts import Gaussian, Manoeuvre, Station, Truth
 from piazzi.problem.stepping import chosen_steps
-from piazzi.problem.two_body import check_orbit_axes, check_two_body
-from piazzi.text import nearest, suggest
-
-MOST_KINDS = 100  # beyond so many kinds of problem, those are forgotten for which no kernel was wanted
-_SPECS: dict[tuple[Any, ...], dict[tuple[Any, ...], KernelSpec]] = {}
+from piazzi.problem.two_body import check_two_body
+from piazzi.text import nearest
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,20 +76,18 @@ class Problem:
         given = [self.stations] if isinstance(self.stations, Station) else list(self.stations)
         model, stations, parameters = with_station_constants(self.model, given, self.parameters)
         put(self, "model", model)
-        put(self, "stations", stations)
-        put(self, "parameters", parameters)
         put(self, "functions", outside.checked_functions(self.functions, model))
-        put(self, "process_noise", self._noise(self.process_noise))
-        put(self, "stations", self._stations())
-        put(self, "parameters", self._parameters())
+        put(self, "process_noise", checked.process_noise(self.process_noise, model))
+        put(self, "stations", checked.stations(stations, model))
+        put(self, "parameters", checked.parameters(parameters, model))
         put(self, "manoeuvres", manoeuvres.checked(self.manoeuvres, self.model))
-        put(self, "integrator", self._integrator())
+        put(self, "integrator", checked.integrator(self.integrator, model))
         if self.prior_time is not None and not isfinite(self.prior_time):
             raise ValueError(f"prior_time is {self.prior_time}; it must be finite")
         put(self, "epoch", epoch_given(self.epoch))
         check_near(self.prior_time or 0.0, self.epoch, "prior_time")
         check_near([m.time for m in self.manoeuvres], self.epoch, "the time of a manoeuvre,")
-        put(self, "prior", self._prior())
+        put(self, "prior", checked.prior(self.prior, model))
         self._check_regular()
         self._lay_out()
         if isinstance(self.integrator, Kepler):
@@ -109,84 +103,6 @@ class Problem:
         lock({name: value for name, value in state.items() if name not in ("model", "truth", "functions")})
 
     # ---- checks --------------------------------------------------------------------------------------------------
-
-    def _prior(self) -> Gaussian:
-        states = self.model.states
-        mean = finite_vector(self.prior.mean, len(states), "prior mean", states)
-        return Gaussian(mean, covariance(self.prior.covariance, len(states), "prior covariance", states))
-
-    def _noise(self, given: Any) -> ProcessNoise:
-        states, names = self.model.states, self.model.names
-        noise = given if isinstance(given, ProcessNoise) else ProcessNoise(np.zeros(len(states)) if given is None else given)
-        if self.model.discrete and noise.is_integral:
-            noise = replace(noise, per="second" if given is None else noise.per, method="scaled")
-        whole = np.shape(noise.covariance)[:1] == (len(names),) and len(names) > len(states)
-        matrix = covariance(noise.covariance, len(names if whole else states), "process noise Q", names if whole else states)
-        full = np.zeros((len(names), len(names)))
-        full[: len(matrix), : len(matrix)] = matrix
-        if noise.axes == "orbit":
-            check_orbit_axes(self.model)
-        return replace(noise, covariance=frozen(full))
-
-    def _stations(self) -> tuple[Station, ...]:
-        out: list[Station] = []
-        for station in self.stations:
-            sensor = self.model.sensor(station.sensor)
-            if any(station.name == other.name for other in out):
-                raise ValueError(f"two stations are called {station.name!r}")
-            what = f"measurement noise R of station {station.name!r}"
-            noise = covariance(station.noise, sensor.width, what, sensor.components, definite=True)
-            out.append(replace(station, noise=noise, numbers=self._numbers(station)))
-        tables = outside.station_numbers(self.model, [s.place for s in out])
-        numbers = [dict(sorted({**s.numbers, **table}.items())) for s, table in zip(out, tables, strict=True)]
-        return tuple(replace(s, numbers=own) for s, own in zip(out, numbers, strict=True))
-
-    def _numbers(self, station: Station) -> dict[str, float]:
-        wanted = self.model.numbers(self.model.sensor(station.sensor))
-        if STATION_TABLE in wanted and station.place is None:
-            raise ValueError(f"station {station.name!r} has no place, which its sensor {station.sensor!r} needs: give place=")
-        if STATION_TABLE in wanted:
-            wanted = tuple(name for name in wanted if name != STATION_TABLE)
-            station = replace(station, numbers={k: v for k, v in station.numbers.items() if k != STATION_TABLE})
-        for name in station.numbers:
-            if name not in wanted:
-                raise ValueError(
-                    f"station {station.name!r} gives {name!r}, which sensor {station.sensor!r} does not use"
-                    f"{nearest(name, wanted)}"
-                )
-        for name in wanted:
-            if name not in station.numbers:
-                near = suggest(name, [*station.numbers, *self.model.states, *self.model.parameter_names])
-                raise ValueError(
-                    f"station {station.name!r} gives no value for {name!r}, which sensor {station.sensor!r} uses{near}"
-                )
-        return {name: _number(station.numbers[name], f"{name!r} of station {station.name!r}") for name in wanted}
-
-    def _parameters(self) -> dict[str, Any]:
-        known = {p.name: p for p in self.model.parameters}
-        for name in self.parameters:
-            if name not in known:
-                raise ValueError(f"unknown parameter {name!r}{nearest(name, known)}")
-        return {name: self._parameter(name, known[name].role) for name in known}
-
-    def _parameter(self, name: str, role: str) -> Any:
-        if name not in self.parameters:
-            raise ValueError(f"parameter {name!r} has no value")
-        given = self.parameters[name]
-        if role == "fixed":
-            return _number(given, f"parameter {name!r}")
-        if not isinstance(given, Gaussian):
-            raise ValueError(f"parameter {name!r} is {role}: give Gaussian(mean, variance), not {given!r}")
-        mean = finite_vector(given.mean, 1, "parameter mean", [name])
-        return Gaussian(mean, covariance(given.covariance, 1, "parameter variance", [name]))
-
-    def _integrator(self) -> Integrator:
-        if self.integrator is None:
-            return Discrete() if self.model.discrete else RungeKutta4()
-        if self.model.discrete != isinstance(self.integrator, Discrete):
-            kind = "a step, x[k+1]: use Discrete()" if self.model.discrete else "continuous: Discrete() does not apply"
-            raise ValueError(f"integrator {type(self.integrator).__name__} does not fit: the model is {kind}")
-        return self.integrator
 
     def _check_regular(self) -> None:
         """Refuse a prior mean where an equation has no value, or a function of the user's own has wrong derivatives."""
@@ -212,34 +128,22 @@ class Problem:
     @cached_property
     def mean(self) -> Array:
         """Prior mean of everything estimated, (n,)."""
-        if self.model.names == self.model.states:
-            return self.prior.mean  # type: ignore[no-any-return]
-        moving = self.prior.mean[list(self.model.sources)]
-        return frozen([*moving, *(self.parameters[c].mean[0] for c in self.model.constants)])
+        return layout.mean(self.model, self.prior, self.parameters)
 
     @cached_property
     def covariance(self) -> Array:
         """Prior covariance of everything estimated, (n, n)."""
-        if self.model.names == self.model.states:
-            return self.prior.covariance  # type: ignore[no-any-return]
-        out = np.zeros((self.model.n, self.model.n))
-        sources, nd = list(self.model.sources), len(self.model.moving)
-        out[:nd, :nd] = self.prior.covariance[np.ix_(sources, sources)]
-        for i, name in enumerate(self.model.constants, start=nd):
-            out[i, i] = self.parameters[name].covariance[0, 0]
-        return frozen(out)
+        return layout.covariance(self.model, self.prior, self.parameters)
 
     @cached_property
     def given(self) -> Array:
         """Values of the parameters that are not estimated, at least one number long."""
-        values = [self.parameters[name] for name in self.model.given]
-        return frozen([v.mean[0] if isinstance(v, Gaussian) else v for v in values] or [0.0])
+        return layout.given(self.model, self.parameters)
 
     @property
     def given_bundle(self) -> Given:
         """What kernels are told of the model; data of functions from outside reach as far as `cover` was asked for."""
-        told = self.__dict__.get("_told")
-        return told[2] if told else self._tell(self.prior_time or 0.0, self.prior_time or 0.0)
+        return self._told.bundle
 
     def cover(self, first: float, last: float) -> bool:
         """Have data of the functions from outside for these times (s); True where what kernels are told has changed.
@@ -249,29 +153,18 @@ class Problem:
         ValueError
             Where a function has no values at some of them.
         """
-        if not self._recipes:
-            return False
-        outside.check_span(self._spans, first, last)
-        told = self.__dict__.get("_told")
-        if told and told[0] <= first <= last <= told[1]:
-            return False
-        self._tell(*((min(first, told[3]), max(last, told[4])) if told else (first, last)))
-        return True
+        return self._told.cover(first, last)
 
     def given_over(self, first: float, last: float) -> Given:
         """What kernels are told of the model, with data for these times (s); raises ValueError as `cover` does."""
-        self.cover(first, last)
-        return self.given_bundle
+        self._told.cover(first, last)
+        return self._told.bundle
 
-    def _tell(self, first: float, last: float) -> Given:
-        begin, end = outside.days(first, last)
-        given = Given(
-            parameters=self.given,
-            manoeuvres=frozen(manoeuvres.packed(self.manoeuvres, self.model)),
-            data=outside.block_of(self._recipes, begin, end),
-        )
-        self.__dict__["_told"] = begin, end, given, first, last
-        return given
+    @cached_property
+    def _told(self) -> outside.Told:
+        recipes = outside.recipes_of(self.model, self.functions, [s.place for s in self.stations])
+        spans = outside.spans_of(self.model, self.functions) if recipes else ()
+        return outside.Told(self.given, manoeuvres.packed(self.manoeuvres, self.model), recipes, spans, self.prior_time or 0.0)
 
     @property
     def checksums(self) -> dict[str, str]:
@@ -279,24 +172,10 @@ class Problem:
         places = {f"station {s.name}": s.place for s in self.stations if s.place is not None}
         return {name: recipe.checksum for name, recipe in {**self.functions, **places}.items()}
 
-    @cached_property
-    def _recipes(self) -> tuple[outside.Recipe, ...]:
-        return outside.recipes_of(self.model, self.functions, [s.place for s in self.stations])
-
-    @cached_property
-    def _spans(self) -> tuple[tuple[str, tuple[float, float]], ...]:
-        return outside.spans_of(self.model, self.functions)
-
     @property
     def prior_bundle(self) -> Belief:
         """The prior of everything estimated, for kernels, which do not write to it."""
         return Belief(mean=self.mean, covariance=self.covariance)
-
-    @cached_property
-    def station_sensor(self) -> Array:
-        """Index of each station's sensor, (S,)."""
-        names = [s.name for s in self.model.sensors]
-        return _indices(names.index(s.sensor) for s in self.stations)
 
     @cached_property
     def considered(self) -> tuple[str, ...]:
@@ -310,43 +189,44 @@ class Problem:
         return min((len(s.noise) for s in self.stations), default=0)
 
     @cached_property
-    def station_noise(self) -> Array:
-        """R of each station, (S, M, M), unit variance where a sensor has fewer components."""
-        M = self.model.width
-        out = np.zeros((len(self.stations), M, M))
-        for s, station in enumerate(self.stations):
-            m = len(station.noise)
-            out[s, :m, :m] = station.noise
-            for i in range(m, M):
-                out[s, i, i] = 1.0
-        out.setflags(write=False)
-        return out
+    def station_sensor(self) -> Array:
+        """Index of each station's sensor, (S,)."""
+        return layout.station_sensor(self.stations, self.model)
 
     @cached_property
-    def station_limits(self) -> tuple[tuple[float, ...], ...]:
-        """For each station and component, the largest measurement that a number holds more exactly than its noise."""
-        sigma = np.sqrt(np.diagonal(self.station_noise, axis1=1, axis2=2))
-        return tuple(tuple(row) for row in (sigma / np.finfo(float).eps).tolist())
+    def station_noise(self) -> Array:
+        """R of each station, (S, M, M), unit variance where a sensor has fewer components."""
+        return layout.station_noise(self.stations, self.model)
+
+    @cached_property
+    def station_numbers(self) -> Array:
+        """Each station's own numbers in alphabetical order, (S, widest)."""
+        return layout.station_numbers(self.stations, self.model)
 
     @cached_property
     def station_correlated(self) -> Array:
         """For each station, 1 where its R is not diagonal, (S,)."""
-        return _indices(not _is_diagonal(s.noise) for s in self.stations)
+        return layout.station_correlated(self.stations)
+
+    @cached_property
+    def station_limits(self) -> tuple[tuple[float, ...], ...]:
+        """For each station and component, the largest measurement that a number holds more exactly than its noise."""
+        return layout.station_limits(self.station_noise)
+
+    @cached_property
+    def least_limit(self) -> float:
+        """The smallest of `station_limits`, infinite where there is no station."""
+        return min((limit for station in self.station_limits for limit in station), default=inf)
+
+    @cached_property
+    def least_noise(self) -> float:
+        """The smallest variance in `station_noise`, infinite where there is no station."""
+        return float(np.diagonal(self.station_noise, axis1=1, axis2=2).min(initial=inf))
 
     @cached_property
     def is_correlated(self) -> bool:
         """Whether the R of any station is not diagonal."""
         return bool(self.station_correlated.any())
-
-    @cached_property
-    def station_numbers(self) -> Array:
-        """Each station's own numbers in alphabetical order, (S, widest)."""
-        out = np.zeros((len(self.stations), self.model.most_numbers))
-        for s, station in enumerate(self.stations):
-            if station.numbers:
-                out[s, : len(station.numbers)] = list(station.numbers.values())
-        out.setflags(write=False)
-        return out
 
     def spec(self, *fragments: str, lanes: int = 1) -> KernelSpec:
         """The compiled module with these fragments, for this model, integrator, kind of noise, and manoeuvres or none."""
@@ -374,10 +254,7 @@ class Problem:
         integrator, events = self.integrator, bool(self.manoeuvres)
         assert integrator is not None
         traits = self.model, type(integrator), integrator.scheme, events, self.process_noise.axes, self.noise_varies
-        if len(_SPECS) > MOST_KINDS:  # the others stay: what is loaded is found by them, and stays too
-            for kind in [kind for kind, specs in list(_SPECS.items()) if not specs]:
-                _SPECS.pop(kind, None)
-        return _SPECS.setdefault(traits, {})
+        return evaluation.shared_specs(traits)
 
     @cached_property
     def noise_fragment(self) -> str:
@@ -531,20 +408,3 @@ class Problem:
         if name not in names:
             raise ValueError(f"unknown station {name!r}{nearest(name, names)}")
         return names.index(name)
-
-
-def _number(value: Any, what: str) -> float:
-    out = numeric(value, what)
-    if out.size != 1 or not np.isfinite(out).all():
-        raise ValueError(f"{what} is {value!r}; it must be one finite number")
-    return float(out.reshape(-1)[0])
-
-
-def _indices(values: Iterable[int]) -> Array:
-    out = np.array([*values], dtype=np.int64)
-    out.setflags(write=False)
-    return out
-
-
-def _is_diagonal(R: Array) -> bool:
-    return len(R) == 1 or not np.count_nonzero(R - np.diag(np.diag(R)))
