@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from piazzi.estimate.long_steps import step_warning
     from piazzi.estimate.losses import Cauchy, Huber, Tukey
     from piazzi.estimate.prior import with_prior_at
+    from piazzi.estimate.propagation import Propagation, propagate
     from piazzi.estimate.sliding_window import SlidingWindow
     from piazzi.estimate.smoother import Smoother
     from piazzi.estimate.square_root import SquareRootKalmanFilter
@@ -104,6 +105,7 @@ _WHERE = {
         "piazzi.estimate.unscented": "UnscentedKalmanFilter",
         "piazzi.estimate.long_steps": "step_warning",
         "piazzi.estimate.prior": "with_prior_at",
+        "piazzi.estimate.propagation": "Propagation propagate",
         "piazzi.estimate.substeps": "choose_substeps substep_error",
         "piazzi.loading": "load",
         "piazzi.outside.function": "Function",
@@ -130,12 +132,12 @@ __all__ = [
     "DormandPrince5", "Ephemeris", "Epoch", "Estimate", "Estimated", "Euler", "ExtendedKalmanFilter", "FactorGraph",
     "Forecast", "Function", "GaussJackson", "Gaussian", "Heun", "Huber", "Integrator", "Interpolation", "Kepler",
     "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre", "Midpoint", "Model", "Observability", "Observations",
-    "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise", "Ralston", "RungeKutta", "RungeKutta4", "RungeKutta8",
-    "Schedule", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station", "Study", "Table", "Taylor",
-    "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps", "compare",
+    "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise", "Propagation", "Ralston", "RungeKutta", "RungeKutta4",
+    "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station", "Study", "Table",
+    "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps", "compare",
     "determine", "difference", "earth", "formats", "kepler_transition", "load", "observability", "orbit", "passes", "predict",
-    "propagate_kepler", "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning", "substep_error",
-    "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
+    "propagate", "propagate_kepler", "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning",
+    "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip
 
 

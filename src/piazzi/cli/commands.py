@@ -22,6 +22,7 @@ COMMANDS = (
     "report",
     "tracking",
     "determine",
+    "propagate",
     "difference",
     "data",
 )
@@ -61,6 +62,7 @@ def piazzi() -> None:
       piazzi compare b612-range --with ekf --with graph
       piazzi windows tracking.npz               how long a window has to be
       piazzi observability b612-range-q0        what can be seen, and how well
+      piazzi propagate orbit.oem --to "3 day"   where it will be, how sure
       piazzi difference fit.oem truth.sp3       how far two orbits are apart
       piazzi report tracking.npz -o page.html   a self-contained interactive page
       piazzi scenarios list                     what is built in

@@ -42,6 +42,11 @@ def write_estimate(path: str | os.PathLike[str], estimate: Estimate) -> None:
     _write(path, groups)
 
 
+def write_dataset(path: str | os.PathLike[str], dataset: xarray.Dataset) -> None:
+    """Write a dataset for any NetCDF reader, whole or not at all; raises OSError."""
+    _write(path, {"/": dataset})
+
+
 def read_netcdf(path: str | os.PathLike[str]) -> tuple[Problem, Tracking]:
     """Problem and measurements of a file that `write_netcdf` or `write_estimate` wrote.
 
