@@ -191,7 +191,7 @@ def read_problem(file: Table, name: str, units: Units, start: float | None = Non
     if not physics.states:
         return None
     stations = read_stations(file, physics, units, epoch)
-    prior, prior_time = read_prior(file.table("prior"), physics, file.table("truth"), units, start)
+    prior, prior_time = read_prior(file.table("prior"), physics, file.table("truth"), units, start, epoch)
     noise = read_noise(file.table("process_noise"), physics) if "process_noise" in file else None
     gauss_markov = read_gauss_markov(file.table("gauss_markov"), physics, units) if "gauss_markov" in file else None
     manoeuvres = read_manoeuvres(file, physics, units)

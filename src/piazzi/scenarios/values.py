@@ -12,6 +12,8 @@ from piazzi.problem import Gaussian, ProcessNoise, Station
 from piazzi.problem.checks import Array, covariance
 from piazzi.problem.constants import constant_name
 from piazzi.scenarios.equations import Physics, read_schedule
+from piazzi.scenarios.orbit_prior import AXES, names_orbit, read_orbit, to_states
+from piazzi.scenarios.orbit_prior import STATES as ORBIT
 from piazzi.scenarios.table import Table, shown
 from piazzi.units import ONE, Units, is_quantity, size_of
 
@@ -51,31 +53,77 @@ def read_spread(
 
 
 def read_prior(
-    table: Table, physics: Physics, truth: Table, units: Units, start: float | None
+    table: Table, physics: Physics, truth: Table, units: Units, start: float | None, epoch: Epoch | None = None
 ) -> tuple[Gaussian | None, float | None]:
     """Belief about the states, and its time; ``mean = "truth"`` is the perfect guess.
 
     The time is `start` where none is given, and None for ``time = "first"``: the first measurement, whenever that is.
     """
-    states = physics.states
-    factors = physics.factors(states)
+    if isinstance(table.raw("time"), str):
+        table.text("time", choices=(FIRST,))
+        time = None
+    else:
+        time = table.number("time", units.time()) if "time" in table else start
+    P6: Array | None = None
+    if names_orbit(table):
+        orbit, P6, time = read_orbit(table, physics, units, epoch, time)
+        mean = None if orbit is None else _with_orbit(table, physics, orbit)
+    else:
+        mean = _mean(table, physics, truth)
+    P = _prior_covariance(table, physics, mean, P6)
+    table.finish((*SPREADS, "axes"))
+    return (None if mean is None or P is None else Gaussian(mean, P)), time
+
+
+def _mean(table: Table, physics: Physics, truth: Table) -> Array | None:
+    """A number for every state, in SI."""
     if table.raw("mean") is None:
         table.fault("mean", "is missing: give a number for every state")
     source, key = (truth, "state") if table.raw("mean") == "truth" else (table, "mean")
     if source is truth and not isinstance(truth.raw("state"), list | Mapping):
         table.fault("mean", 'is "truth", so truth.state must give numbers')
         source = Table({}, "", table.faults)
-    mean = source.vector(key, states)
-    P = read_spread(table, states, factors)
-    if isinstance(table.raw("time"), str):
-        table.text("time", choices=(FIRST,))
-        time = None
-    else:
-        time = table.number("time", units.time()) if "time" in table else start
-    table.finish(SPREADS)
-    if mean is None or P is None:
-        return None, time
-    return Gaussian(mean * factors, P), time
+    mean = source.vector(key, physics.states)
+    return None if mean is None else np.asarray(mean * physics.factors(physics.states))
+
+
+def _with_orbit(table: Table, physics: Physics, orbit: Array) -> Array | None:
+    """The orbit's six numbers, and those of further states from the mean."""
+    others = [state for state in physics.states if state not in ORBIT]
+    rest: Array | None = np.zeros(0)
+    if others and any(key in table for key in ("a", "file")):
+        rest = table.vector("mean", others)
+        if rest is None and "mean" not in table:
+            table.fault("mean", f"is missing: the orbit does not say {others[0]!r}")
+    elif others:
+        whole = table.vector("mean", physics.states)
+        rest = None if whole is None else whole[[physics.states.index(s) for s in others]]
+    if rest is None:
+        return None
+    found = dict(zip(ORBIT, orbit, strict=True)) | dict(zip(others, rest * physics.factors(others), strict=True))
+    return np.array([found[state] for state in physics.states])
+
+
+def _prior_covariance(table: Table, physics: Physics, mean: Array | None, P6: Array | None) -> Array | None:
+    """The covariance in SI: that of the file unless the section has one, along the axes that it names."""
+    states = physics.states
+    given = any(key in table for key in SPREADS)
+    if not given and P6 is not None and tuple(states) == ORBIT:
+        return P6
+    P = read_spread(table, states, physics.factors(states))
+    axes = table.text("axes", "states", AXES)
+    if P is None or mean is None or axes in (None, "states"):
+        return P
+    if not {*ORBIT} <= {*states} or physics.forces is None:
+        table.fault("axes", f"is {axes}, which only orbits of [earth] have")
+        return None
+    where = [states.index(state) for state in ORBIT]
+    whole = np.eye(len(states))
+    with table.faults.at(table.at("axes")):
+        whole[np.ix_(where, where)] = to_states(mean[where], str(axes))
+        out = whole @ P @ whole.T
+        return np.asarray(0.5 * (out + out.T))
+    return None
 
 
 def read_noise(table: Table, physics: Physics) -> ProcessNoise | None:
