@@ -83,6 +83,10 @@ class Tabulated:
         check_count(self.signature, t)
         return derivatives(self.signature, self.block(*t, *t), *t)
 
+    def arrays(self, t: Array) -> Array:
+        """Values at times (K,), a row for each."""
+        return self.pieces(float(t.min()), float(t.max()))(t)[0]
+
 
 def _of_day(epoch: Epoch) -> tuple[float, float]:
     """Seconds of the day of UTC, whole and the rest."""
@@ -155,6 +159,11 @@ class Rotation(Tabulated):
         R = np.array(value(table, data, t)).reshape(3, 3)
         rate = derivatives(table, data, t).reshape(3, 3)
         return (R.T, rate.T) if self.signature.transposed else (R, rate)
+
+    def arrays(self, t: Array, *vector: Array) -> Array:
+        """The components along the other axes at times and vectors, (K, 3)."""
+        R = super().arrays(t).reshape(-1, 3, 3)
+        return np.asarray(np.einsum("kji,jk->ki" if self.signature.transposed else "kij,jk->ki", R, np.stack(vector)))
 
     def value(self, *arguments: float) -> tuple[float, ...]:
         """The components along the other axes, at t, x, y, z."""

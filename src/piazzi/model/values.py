@@ -33,6 +33,8 @@ def with_arrays(
 ) -> dict[str, Any]:
     """As `with_values`, of arrays of numbers that go together, for the definitions that are wanted.
 
+    A function that has `arrays` is asked for all rows at once.
+
     Raises
     ------
     ValueError
@@ -47,8 +49,13 @@ def with_arrays(
         arguments = [evaluate_arrays(text, out) for text in d.texts]
         if d.function:
             shape = np.broadcast_shapes(*map(np.shape, arguments))
-            rows = zip(*(np.broadcast_to(a, shape).reshape(-1).tolist() for a in arguments), strict=True)
-            found = np.array([(functions or {})[d.function].value(*row) for row in rows], dtype=float)
+            rows = [np.broadcast_to(a, shape).reshape(-1) for a in arguments]
+            function = (functions or {})[d.function]
+            found = (
+                function.arrays(*rows)
+                if hasattr(function, "arrays")
+                else np.array([function.value(*row) for row in zip(*(a.tolist() for a in rows), strict=True)], dtype=float)
+            )
             out.update((name, found[:, i].reshape(shape)) for i, name in enumerate(d.names))
         else:
             out[d.names[0]] = arguments[0]

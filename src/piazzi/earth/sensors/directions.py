@@ -111,11 +111,6 @@ def right_ascension_declination(
         ray.definitions[names("turned")] = f"{turn}({ray.received}, {', '.join(sight)})"
         sight = [f"turned_{a}" for a in AXES]
     x, y, z = sight
-    if any(word in " ".join(visible) for word in ("elevation", "mask")):
-        air = Air()
-        air.turn(ray.received, tuple(f"line_{a}" for a in AXES))
-        ray.definitions |= air.definitions
-        ray.numbers |= air.numbers
     kinds = ("right_ascension", "declination")
     values = (f"atan2({y}, {x})", f"atan2({z}, sqrt({x}**2 + {y}**2))")
     equations = {kind: ray.biased(value, kind, biases) for kind, value in zip(kinds, values, strict=True)}

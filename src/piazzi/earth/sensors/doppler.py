@@ -51,13 +51,11 @@ def range_rate(
         For a path, tag, count or medium that there is not.
     """
     extras = {"relativity": relativity, "troposphere": troposphere, "ionosphere": ionosphere}
-    look = "elevation" in " ".join(visible)
     if count is None:
         for what, given in extras.items():
             if given:
                 raise ValueError(f"{what} changes slowly and is not in a rate at an instant: give count, or leave it out")
         ray = ray_of(path, tag, steps=steps, time_bias=time_bias, transmitter=transmitter)
-        ray.media(None, None, look=look)
         value = _mean_rate(ray, tag)
     else:
         one_of(count, REFERENCES, "count")
@@ -66,7 +64,7 @@ def range_rate(
         common: Any = {"relativity": relativity, "time_bias": time_bias, "transmitter": transmitter, "steps": True}
         ray, other = (ray_of(path, tag, shift=s, prefix=p, **common) for s, p in ((end, ""), (begin, "begin_")))
         for one in (ray, other):
-            one.media(troposphere, ionosphere, advanced=True, look=look and one is ray)
+            one.media(troposphere, ionosphere, advanced=True)
         value = f"({ray.length} - ({other.length}))/count"
         ray.add(other)
         ray.numbers["count"] = 10.0
@@ -147,7 +145,6 @@ def frequency(
     if not nominal > 0.0:
         raise ValueError(f"nominal is {nominal!r}; a frequency is positive, in Hz")
     ray = ray_of("one-way", "reception", steps=steps, time_bias=time_bias)
-    ray.media(None, None, look="elevation" in " ".join(visible))
     (rate,) = _rates(ray, "reception")
     carrier, drift = (f"{what}{ray.picked(what, passes)}" for what in ("carrier", "drift"))
     ray.numbers |= {"carrier": 0.0, "drift": 0.0, "since": 0.0}

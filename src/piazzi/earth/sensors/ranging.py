@@ -46,7 +46,8 @@ def range(  # noqa: A001
     parameters : numbers such as ``range_bias`` that are parameters of the model, estimated, common to its stations; or a
         mapping to other roles
     transmitter : the other station of "three-way"
-    visible : rules for simulation, see `Sensor`; ``elevation`` and ``mask`` are among its names where they are used
+    visible : when stations measure in simulation: "above" their ``mask`` (rad), "dark", with the Sun below their ``night``
+        (rad, default -12 degrees), "sunlit", with the satellite out of the shadow of the Earth; or rules as `Sensor` takes them
 
     Raises
     ------
@@ -54,7 +55,7 @@ def range(  # noqa: A001
         For a path, tag or medium that there is not.
     """
     ray = ray_of(path, tag, steps=steps, relativity=relativity, time_bias=time_bias, transmitter=transmitter)
-    ray.media(troposphere, ionosphere, look="elevation" in " ".join(visible))
+    ray.media(troposphere, ionosphere)
     ray.numbers |= {"range_scale": 0.0, "centre_of_mass": 0.0}
     value = ray.biased(f"(1 + range_scale)*({ray.length} - centre_of_mass)", "range", biases)
     return ray.instrument(name, {"range": value}, parameters, visible, units={"range": "m"}, mapping=mapping)

@@ -9,9 +9,10 @@ from typing import Any
 from piazzi.earth.sensors.air import Air
 from piazzi.earth.sensors.instrument import Instrument, one_of, picked, with_parameters
 from piazzi.earth.sensors.light import PATHS, TAGS, Light, light, shapiro
-from piazzi.earth.sensors.text import used
+from piazzi.earth.sensors.visibility import rule
 from piazzi.earth.stations import Station
 from piazzi.earth.tabulated import Place
+from piazzi.model.pruning import used_definitions
 
 
 @dataclass
@@ -35,12 +36,12 @@ class Ray:
         """Mean length of the legs with all delays, m."""
         return " + ".join([self.light.mean, *self.delays])
 
-    def media(self, troposphere: str | None, ionosphere: str | None, advanced: bool = False, look: bool = False) -> None:
+    def media(self, troposphere: str | None, ionosphere: str | None, advanced: bool = False) -> None:
         """What lies between them, at the elevation from the receiving station, for the mean of the legs.
 
         `advanced` is whether the ionosphere advances what is measured, as phases and Doppler.
         """
-        if not (troposphere or ionosphere or look):
+        if not (troposphere or ionosphere):
             return
         air, leg = Air(self.prefix), self.light.legs[0]
         air.look(self.received, leg.satellite, leg.station)
@@ -67,11 +68,15 @@ class Ray:
         visible: Sequence[str] = (),
         **others: Any,
     ) -> Instrument:
-        """The sensor of these components; `others` are what else a sensor takes."""
-        numbers = self.numbers | ({"mask": 0.0} if "mask" in " ".join(visible) else {})
+        """The sensor of these components; `visible` are rules, `others` what else a sensor takes."""
+        rules = [rule(given) for given in visible]
+        for _, text, numbers in rules:
+            self.definitions |= text
+            self.numbers |= numbers
+        visible = [text for text, _, _ in rules]
         within = [text for root in self.light.roots.values() for text in root["definitions"].values()]
-        definitions = used({**self.light.definitions, **self.definitions}, [*equations.values(), *visible, *within])
-        left, roles = with_parameters(numbers, self.roles, parameters)
+        definitions = used_definitions({**self.light.definitions, **self.definitions}, [*equations.values(), *visible, *within])
+        left, roles = with_parameters(self.numbers, self.roles, parameters)
         return Instrument(
             name,
             equations,

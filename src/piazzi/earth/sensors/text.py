@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 AXES = "xyz"
 _WORD = re.compile(r"(?<![\w.])[A-Za-z]\w*")
@@ -44,15 +44,3 @@ def renamed(definitions: Mapping[str, str], prefix: str, given: Mapping[str, str
     """Definitions of a formula with a prefix to their names, and with other text for some of the arguments."""
     new = {name: f"{prefix}_{name}" for name in definitions} | {name: f"({text})" for name, text in given.items()}
     return {new[name]: _WORD.sub(lambda found: new.get(found[0], found[0]), text) for name, text in definitions.items()}
-
-
-def used(definitions: Mapping[str, str], texts: Iterable[str]) -> dict[str, str]:
-    """Those definitions of which the texts, or a definition that they need, use a name."""
-    left = dict(definitions)
-    words = {word for text in texts for word in _WORD.findall(text)}
-    found: dict[str, str] = {}
-    while now := {names: text for names, text in left.items() if words & set(_WORD.findall(names))}:
-        found |= now
-        words = {word for text in now.values() for word in _WORD.findall(text)}
-        left = {names: text for names, text in left.items() if names not in now}
-    return {names: text for names, text in definitions.items() if names in found}

@@ -1,0 +1,37 @@
+"""Who sees what in simulation: the satellite above the mask, the station in the dark, the satellite in sunlight.
+
+Rules have the place of now, without light time.
+"""
+
+from __future__ import annotations
+
+from math import radians
+
+from piazzi.earth.geodetic import ELLIPSOIDS
+from piazzi.earth.sensors.air import Air
+from piazzi.earth.sensors.text import AXES, names
+
+RULES = ("above", "dark", "sunlit")
+NIGHT = radians(-12.0)  # of the Sun's elevation: the end of nautical twilight
+
+
+def rule(name: str) -> tuple[str, dict[str, str], dict[str, float]]:
+    """A rule by its name: text that is above zero where it holds, definitions, numbers of the station."""
+    if name == "above":
+        air = Air("now_")
+        line = tuple(f"now_line_{a}" for a in AXES)
+        text = {names("now_place"): "station(t)"} | {f"now_line_{a}": f"{a} - now_place_{a}" for a in AXES}
+        air.turn("t", line)
+        return "now_elevation - mask", text | air.definitions, air.numbers | {"mask": 0.0}
+    if name == "dark":
+        air = Air("dusk_")
+        air.turn("t", tuple(f"sun_{a}" for a in AXES))
+        return "night - dusk_elevation", air.definitions, air.numbers | {"night": NIGHT}
+    if name == "sunlit":
+        radius = ELLIPSOIDS["WGS84"][0]
+        text = {
+            "sunward": "(x*sun_x + y*sun_y + z*sun_z)/sun_r",
+            "aside": f"sqrt(x**2 + y**2 + z**2 - sunward**2) - {radius!r}",
+        }
+        return "max(sunward, aside)", text, {}
+    return name, {}, {}
