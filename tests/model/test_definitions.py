@@ -180,11 +180,9 @@ def test_source_and_derivation_grow_with_the_number_of_definitions():
 def test_a_model_shows_its_definitions(capsys):
     NAMED.show()
     shown = capsys.readouterr().out
-    assert (
-        "definitions and their derivatives" in shown
-        and "pull_by_x" in shown
-        and "definitions and their derivatives for radar" in shown
-    )
+    assert "\ndefinitions\n" in shown and "\n  pull = -mu/r**3\n" in shown
+    assert "\nderivatives of definitions\n" in shown and "∂pull/∂x = 3*mu*∂r/∂x/r**4\n" in shown
+    assert "\ndefinitions of radar\n" in shown
 
 
 def test_models_with_definitions_are_values():

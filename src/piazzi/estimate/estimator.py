@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
+from piazzi.estimate.lost_root import lost_root
 from piazzi.estimate.soundness import defect
 from piazzi.kernels import build_seconds
 from piazzi.problem import Problem, Tracking
@@ -149,7 +150,9 @@ class Estimate(Locked):
 
     @cached_property
     def _why_not(self) -> str:
-        return self.failure or self._defect()
+        found = self.failure or self._defect()
+        root = lost_root(self.problem, self.tracking, self.mean) if found else ""
+        return f"{found}: {root}" if root else found
 
     def _defect(self) -> str:
         """The first epoch whose result cannot be used, "" if there is none."""

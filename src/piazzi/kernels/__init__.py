@@ -1,6 +1,6 @@
 """Equations become compiled code."""
 
-from piazzi.kernels.cache import build_seconds, fragment, is_compiled, load
+from piazzi.kernels.cache import build_seconds, fragment, is_compiled, load, load_plain
 from piazzi.kernels.integrators import ConstantAcceleration, Discrete, DormandPrince, Integrator, Kepler, Taylor
 from piazzi.kernels.runge_kutta import (
     DormandPrince5,
@@ -38,4 +38,5 @@ __all__ = [
     "fragment",
     "is_compiled",
     "load",
+    "load_plain",
 ]

@@ -43,6 +43,12 @@ def load(spec: KernelSpec) -> SimpleNamespace:
     return _made(spec, compiled) if found is None else found
 
 
+def load_plain(spec: KernelSpec) -> SimpleNamespace:
+    """The entries uncompiled, in any mode: for a single look."""
+    found = _loaded.get((spec, False))
+    return _made(spec, False) if found is None else found
+
+
 def _made(spec: KernelSpec, compiled: bool) -> SimpleNamespace:
     """The entries, by one thread at a time: the others wait for what it makes, which is sooner than to make it as well."""
     with _making:

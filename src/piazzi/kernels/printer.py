@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 from piazzi.expressions import time_limit
 from piazzi.expressions.functions import of_sympy
 from piazzi.expressions.time_limit import TooSlowError, each_with_time_limit, with_time_limit
-from piazzi.model.stages import Call, Elsewhen, Solve, Stage
+from piazzi.model.stages import Call, Elsewhen, Solve, Stage, Verdict
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 A = TypeVar("A")
 T = TypeVar("T")
-CONVERGED = 1e-6  # the last step to a root, relative to it: Newton's method squares that, so that 1e-12 is left
+CONVERGED = 1e-12  # of what is zero at a root, relative to its terms
 _SLOW = 4  # cycles of a root or a quotient, in multiplications
 
 
@@ -220,6 +220,8 @@ def _define(writer: _Writer, stage: AnyStage) -> None:
             _define_elsewhen(writer, stage)
         case Solve():
             _define_root(writer, stage)
+        case Verdict():
+            _define_verdict(writer, stage)
 
 
 def _define_values(writer: _Writer, stage: Stage) -> None:
@@ -250,18 +252,28 @@ def _define_elsewhen(writer: _Writer, stage: Elsewhen) -> None:
 
 
 def _define_root(writer: _Writer, stage: Solve) -> None:
-    """Newton's iteration, from a start in as many lanes as the state has; NaN where its last step is not small."""
-    trial, step = writer.defines(stage.unknown), writer.next_name()
-    writer.lines += [f"{trial} = {writer.text(stage.start)} + 0.0*x0", f"{step} = {trial}"]
+    """Newton's iteration, from a start in as many lanes as the state has."""
+    (root, slope), trial = map(writer.defines, stage.symbols), writer.defines(stage.unknown)
+    writer.lines += [f"{trial} = {writer.text(stage.start)} + 0.0*x0", f"{slope} = {trial}"]
     outside, writer.lines = writer.lines, []
     for inner in stage.inner:
         _define(writer, inner)
-    writer.lines.append(f"{step} = {writer.atom(stage.residual)}/{writer.atom(stage.slope)}")
-    writer.lines.append(f"{trial} = {trial} - {step}")
+    writer.lines.append(f"{slope} = {writer.text(stage.slope)} + 0.0*x0")
+    writer.lines.append(f"{trial} = {trial} - {writer.atom(stage.residual)}/{slope}")
     body, writer.lines = writer.lines, outside
-    writer.lines += [f"for _ in range({stage.iterations}):", *(f"    {line}" for line in body)]
-    small = f"{CONVERGED!r}*fabs({trial}) + 1e-300"
-    writer.lines.append(f"{writer.defines(stage.symbols[0])} = choose({small}, fabs({step}), {trial}, nan)")
+    writer.lines += [f"for _ in range({stage.iterations}):", *(f"    {line}" for line in body), f"{root} = {trial}"]
+
+
+def _define_verdict(writer: _Writer, stage: Verdict) -> None:
+    """Add nothing to values where a residual is small, and NaN elsewhere."""
+    terms, scale = [writer.atom(term) for term in stage.terms], writer.atom(stage.scale)
+    residual, verdict = writer.next_name(), writer.next_name()
+    writer.lines.append(f"{residual} = fabs({' + '.join(terms)})")
+    size = " + ".join(f"fabs({term})" for term in (*terms, scale))
+    writer.lines.append(f"{verdict} = choose({CONVERGED!r}*({size} - {residual}) + 1e-300, {residual}, 0.0, nan)")
+    for symbol, value in zip(stage.symbols, stage.values, strict=True):
+        value_name = writer.text(value)
+        writer.lines.append(f"{writer.defines(symbol)} = {value_name} + {verdict}")
 
 
 def _written(writer: _Writer, outputs: Sequence[sp.Expr], called: Sequence[str]) -> list[str]:

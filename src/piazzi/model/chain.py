@@ -10,7 +10,7 @@ from piazzi.model.definitions import Definition, needed
 from piazzi.model.functions import AT, ROOT, STATION, STATION_TABLE, Signature
 from piazzi.model.jacobian import jacobian
 from piazzi.model.sensor import Parameter, Sensor
-from piazzi.model.stages import AnyStage, Call, Elsewhen, Solve, Stage
+from piazzi.model.stages import AnyStage, Call, Elsewhen, Solve, Stage, Verdict
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -62,7 +62,7 @@ class Chain:
             if not set(d.provides) & set(wanted):
                 continue
             if d.function == ROOT:
-                self._root(d)
+                self._root(d, wanted)
             elif d.function == AT:
                 self._elsewhen(d)
             elif d.function:
@@ -95,7 +95,7 @@ class Chain:
         """A stage of a value and its derivatives."""
         import sympy as sp
 
-        named = {j: sp.Dummy(f"{new}_by_{self.x[j]}", real=True) for j, slope in slopes.items() if slope.free_symbols}
+        named = {j: sp.Dummy(f"{new.name}_by_{self.x[j].name}", real=True) for j, slope in slopes.items() if slope.free_symbols}
         self.values.append(Stage((new,), (value,)))
         self.partials.append(Stage((new, *named.values()), (value, *(slopes[j] for j in named))))
         self._by_x[new] = dict(slopes) | named
@@ -110,11 +110,14 @@ class Chain:
         if signature.kind == "rotation":
             self._rotation(d, signature, place, arguments)
             return
-        for name, new in zip(d.names, self._outputs(d.function, signature, place, arguments), strict=False):
+        called = [*d.names, *(f"{d.function}_{i}" for i in range(len(d.names), signature.outputs))]
+        for name, new in zip(d.names, self._outputs(called, signature, place, arguments), strict=False):
             self.symbols[name] = new
 
-    def _outputs(self, name: str, signature: Signature, place: Any, arguments: tuple[sp.Expr, ...]) -> tuple[sp.Symbol, ...]:
-        """Symbols of the outputs of a call, which is made once for each set of arguments."""
+    def _outputs(
+        self, names: Sequence[str], signature: Signature, place: Any, arguments: tuple[sp.Expr, ...]
+    ) -> tuple[sp.Symbol, ...]:
+        """Symbols of the outputs of a call, by these names, which is made once for each set of arguments."""
         import sympy as sp
 
         by_argument = self.derivative(sp.Matrix(arguments))
@@ -122,14 +125,15 @@ class Chain:
         key = (signature.function, place, arguments)
         if key in self._lookups:
             return self._lookups[key]
-        outputs = tuple(sp.Dummy(f"{name}_{i}", real=True) for i in range(signature.outputs))
+        outputs = tuple(sp.Dummy(name, real=True) for name in names)
         self._lookups[key] = outputs
         self.values.append(Call(outputs, signature.function, arguments, place))
         if not used:
             self.partials.append(self.values[-1])
             self._by_x |= {o: {} for o in outputs}
             return outputs
-        known = {(i, k): sp.Dummy(f"{name}_{i}_by_{k}", real=True) for i, k in signature.partials}
+        by = [getattr(argument, "name", argument) for argument in arguments]
+        known = {(i, k): sp.Dummy(f"{names[i]}_by_{by[k]}", real=True) for i, k in signature.partials}
         self.partials.append(Call((*outputs, *known.values()), f"{signature.function}_partials", arguments, place))
         for i, o in enumerate(outputs):
             slopes = {j: sum(known[i, k] * by_argument[k, j] for k in range(len(arguments)) if (i, k) in known) for j in used}
@@ -141,7 +145,7 @@ class Chain:
         import sympy as sp
 
         named = {
-            j: sp.Dummy(f"{new}_by_{self.x[j]}", real=True)
+            j: sp.Dummy(f"{new.name}_by_{self.x[j].name}", real=True)
             for j, slope in slopes.items()
             if slope.free_symbols and not slope.is_Symbol
         }
@@ -153,7 +157,8 @@ class Chain:
         import sympy as sp
 
         table = Signature.of_table(9, signature.terms)
-        W = sp.Matrix(3, 3, self._outputs(d.function, table, place, arguments[:1]))
+        names = [f"{d.function}_{i}{j}" for i in "xyz" for j in "xyz"]
+        W = sp.Matrix(3, 3, self._outputs(names, table, place, arguments[:1]))
         turned = (W.T if signature.transposed else W) * sp.Matrix(arguments[1:])
         for name, value in zip(d.names, turned, strict=False):
             self._value(name, value)
@@ -177,8 +182,8 @@ class Chain:
         outputs = tuple(self._new(name) for name in d.names)
         everything = outputs + tuple(sp.Dummy(f"{states[i]}_then", real=True) for i in range(len(outputs), nd))
         self.values.append(Elsewhen(everything, offset))
-        Phi = tuple(sp.Dummy(f"Phi_{i}_{j}", real=True) for i in range(nd) for j in range(n))
-        rates_there = tuple(sp.Dummy(f"f_{i}_then", real=True) for i in range(nd))
+        Phi = tuple(sp.Dummy(f"Phi_{new.name}_{x.name}", real=True) for new in everything for x in states)
+        rates_there = tuple(sp.Dummy(f"{new.name}_by_offset", real=True) for new in everything)
         self.partials.append(Elsewhen(everything, offset, Phi, rates_there))
         for i, new in enumerate(outputs):
             slopes = {j: rates_there[i] * by_offset[0, j] for j in range(len(self.x)) if by_offset[0, j] != 0}
@@ -187,7 +192,7 @@ class Chain:
                     slopes[j] = slopes.get(j, 0) + Phi[i * n + states.index(value)]
             self._slopes(new, slopes)
 
-    def _root(self, d: Definition) -> None:
+    def _root(self, d: Definition, wanted: Collection[str]) -> None:
         """The solution, by Newton's method; its derivative by the implicit function theorem, -(dg/dtau)^-1 dg/dx."""
         import sympy as sp
 
@@ -196,22 +201,23 @@ class Chain:
             self.define_dynamics()  # here, so that no iteration works them out again
         trial = sp.Dummy(name, real=True)
         newton = Chain(self.model, {**self.symbols, name: trial}, [trial])
-        wanted = {n for inner in d.inner for n in inner.provides}
-        newton.define(d.inner, wanted)
+        own = {n for inner in d.inner for n in inner.provides}
+        newton.define(d.inner, own)
         g = sp.Matrix([to_sympy(equation, newton.symbols)])
         slope = newton.derivative(g)[0, 0]
         if slope == 0:
             raise ValueError(f"root {name!r}: its equation does not depend on {name!r}")
         tau = self._new(name)
-        first = to_sympy(start, self.symbols)
-        solve = Solve((tau,), trial, first, d.iterations, tuple(newton.partials), g[0, 0], slope)
+        first, last_slope = to_sympy(start, self.symbols), sp.Dummy("slope", real=True)
+        solve = Solve((tau, last_slope), trial, first, d.iterations, tuple(newton.partials), g[0, 0], slope)
         self.values.append(solve)
         self.partials.append(solve)
         n = len(self.x)
         there = Chain(self.model, self.symbols, [*self.x, tau])
         there._by_x = dict(self._by_x)
-        there.define(d.inner, wanted)
-        row = there.derivative(sp.Matrix([to_sympy(equation, self.symbols)]))
+        there.define(d.inner, own)
+        residual = to_sympy(equation, self.symbols)
+        row = there.derivative(sp.Matrix([residual]))
         self.values += there.values
         self.partials += there.partials
         self._slopes(tau, {j: -row[0, j] / row[0, n] for j in range(n) if row[0, j] != 0})
@@ -223,6 +229,18 @@ class Chain:
                     if j in slopes or (n in slopes and j in self._by_x[tau])
                 }
                 self._slopes(new, total)
+        self._judge([n for n in d.provides if n in wanted], residual, last_slope * tau)
+
+    def _judge(self, names: Sequence[str], residual: sp.Expr, scale: sp.Expr) -> None:
+        """Let these names stand for values that are not numbers where the residual of a root is not small."""
+        import sympy as sp
+
+        values = tuple(self.symbols[name] for name in names)
+        sound = tuple(sp.Dummy(name, real=True) for name in names)
+        self.values.append(Verdict(sound, values, sp.Add.make_args(residual), scale))
+        self.partials.append(self.values[-1])
+        for name, value, new in zip(names, values, sound, strict=True):
+            self.symbols[name], self._by_x[new] = new, self._by_x[value]
 
     def derivative(self, f: sp.Matrix) -> sp.Matrix:
         """df/dx with the derivatives of the definitions in f by their symbols: the chain rule, one link long."""

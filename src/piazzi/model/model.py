@@ -38,6 +38,8 @@ class Model:
         z)"}``, or a tuple of names; they may be fewer than the function has.
     functions : mapping of name to function, or to its signature
         Functions from outside that the equations may call, such as ``earth.Gravity(...)``; their data belong to the `Problem`.
+    roots : mapping of name to a table of ``root``, ``start``, ``iterations`` and ``definitions``
+        Values given by an equation they solve, for dynamics, sensors and rules; see `Sensor`.
 
     Raises
     ------
@@ -55,6 +57,7 @@ class Model:
     memory: Any = field(default_factory=dict)
     definitions: Any = field(default_factory=dict)
     functions: Any = ()
+    roots: Any = ()
 
     if TYPE_CHECKING:  # what is taken; the fields above say what is kept of it
 
@@ -70,6 +73,7 @@ class Model:
             memory: Mapping[str, str] | Sequence[tuple[str, str]] = (),
             definitions: Mapping[Any, Any] | Sequence[Any] = (),
             functions: Mapping[str, Any] | Sequence[tuple[str, Any]] = (),
+            roots: Mapping[str, Mapping[str, Any]] | Sequence[Any] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -82,9 +86,10 @@ class Model:
         functions = dict(self.functions).items()
         put(self, "functions", tuple((name_of(k, "function"), signature_of(v, str(k))) for k, v in functions))
         hoist = Hoist([name for name, _ in self.functions])
-        given = definitions_of(self.definitions, "definitions", hoist)
+        given = definitions_of(self.definitions, "definitions", hoist, self.roots)
         put(self, "dynamics", self._equations(hoist))
         put(self, "definitions", in_order((*given, *hoist.found), "definitions"))
+        put(self, "roots", ())
         put(self, "groups", tuple((str(g), tuple(str(s) for s in members)) for g, members in dict(self.groups).items()))
         put(self, "units", tuple((str(s), str(u)) for s, u in dict(self.units).items()))
         self._check_names()

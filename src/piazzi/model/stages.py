@@ -44,7 +44,7 @@ class Elsewhen:
 class Solve:
     """A root by Newton's method: what is worked out in each iteration at `unknown`, and what is zero there, with its slope."""
 
-    symbols: tuple[sp.Symbol, ...]
+    symbols: tuple[sp.Symbol, ...]  # the root, and the slope of the last iteration
     unknown: sp.Symbol
     start: sp.Expr
     iterations: int
@@ -53,4 +53,17 @@ class Solve:
     slope: sp.Expr
 
 
-AnyStage: TypeAlias = "Stage | Call | Elsewhen | Solve"
+@dataclass(frozen=True)
+class Verdict:
+    """Values that hold where a root is one: `symbols` are not numbers unless what is zero there, the sum of `terms`, is small.
+
+    `values` are those without the condition; `scale` is what the terms are compared with besides themselves.
+    """
+
+    symbols: tuple[sp.Symbol, ...]
+    values: tuple[sp.Symbol, ...]
+    terms: tuple[sp.Expr, ...]
+    scale: sp.Expr
+
+
+AnyStage: TypeAlias = "Stage | Call | Elsewhen | Solve | Verdict"

@@ -29,23 +29,23 @@ def with_values(
 
 
 def with_arrays(
-    values: Mapping[str, Any], wanted: Collection[str], *layers: Definitions, functions: Mapping[str, Any] | None = None
+    values: Mapping[str, Any],
+    wanted: Collection[str],
+    *layers: Definitions,
+    functions: Mapping[str, Any] | None = None,
+    model: Any = None,
 ) -> dict[str, Any]:
     """As `with_values`, of arrays of numbers that go together, for the definitions that are wanted.
 
     A function that has `arrays` is asked for all rows at once.
-
-    Raises
-    ------
-    ValueError
-        For a root, or the state at another instant, which have no values here.
     """
     import numpy as np
 
     out = dict(values)
     for d in (d for layer in layers for d in layer if set(d.provides) & set(wanted)):
         if d.function in (ROOT, AT):
-            raise ValueError(f"{d.names[0]!r} is {d.function}(...), which a rule cannot use: write it with the states of now")
+            out.update(_one_by_one(d, out, functions or {}, model))
+            continue
         arguments = [evaluate_arrays(text, out) for text in d.texts]
         if d.function:
             shape = np.broadcast_shapes(*map(np.shape, arguments))
@@ -60,6 +60,20 @@ def with_arrays(
         else:
             out[d.names[0]] = arguments[0]
     return out
+
+
+def _one_by_one(d: Definition, known: Mapping[str, Any], functions: Mapping[str, Any], model: Any) -> dict[str, Any]:
+    """Values of a root, or of the state at another instant, for each row of numbers that go together."""
+    import numpy as np
+
+    names, shape = list(known), np.broadcast_shapes(*map(np.shape, known.values()))
+    rows = zip(*(np.broadcast_to(known[name], shape).reshape(-1).tolist() for name in names), strict=True)
+    found: list[list[float]] = []
+    for row in rows:
+        here = dict(zip(names, row, strict=True))
+        _define(d, here, functions, model)
+        found.append([here[name] for name in d.provides])
+    return {name: np.reshape(column, shape) for name, column in zip(d.provides, zip(*found, strict=True), strict=True)}
 
 
 def _define(d: Definition, out: dict[str, float], functions: Mapping[str, Any], model: Any) -> None:
@@ -80,7 +94,7 @@ def _define(d: Definition, out: dict[str, float], functions: Mapping[str, Any], 
 
 
 def _solve(d: Definition, out: dict[str, float], functions: Mapping[str, Any], model: Any) -> None:
-    """A root by the secant method; NaN where that does not arrive."""
+    """A root by Newton's method, with differences for slopes; NaN where that does not arrive."""
     name, (equation, start) = d.names[0], d.texts
 
     def residual(tau: float) -> float:
@@ -89,16 +103,16 @@ def _solve(d: Definition, out: dict[str, float], functions: Mapping[str, Any], m
             _define(inner, out, functions, model)
         return evaluate(equation, out)
 
-    before = evaluate(start, out)
-    g_before = residual(before)
-    tau = before + g_before
+    tau = evaluate(start, out)
     for _ in range(MOST_ITERATIONS):
         g = residual(tau)
         if g == 0.0:
             return
-        if not isfinite(g) or g == g_before:
+        h = 1e-5 * (abs(tau) or abs(g))
+        rise = residual(tau + h) - residual(tau - h)
+        if not isfinite(g) or not isfinite(rise) or rise == 0.0:
             break
-        before, g_before, tau = tau, g, tau - g * (tau - before) / (g - g_before)
+        before, tau = tau, tau - 2.0 * h * g / rise
         if abs(tau - before) <= 1e-12 * abs(tau):
             residual(tau)
             return

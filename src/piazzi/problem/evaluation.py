@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from math import isnan
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from piazzi.expressions import evaluate
 from piazzi.kernels import Integrator, KernelSpec
 from piazzi.kernels.bundle import Given
 from piazzi.model import Model
-from piazzi.model.functions import STATION
+from piazzi.model.functions import ROOT, STATION
 from piazzi.model.values import with_values
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.parts import Station
@@ -94,6 +95,9 @@ def singular_equation(
     """A line naming the first equation without a finite value at these states and parameters, or "" where all have one."""
     values = with_values({**numbers, "t": t, "dt": 1.0}, model.definitions, functions=functions, model=model)
     at = ", ".join(f"{name} = {numbers[name]:g}" for name in model.names)
+    for d in model.definitions:
+        if d.function == ROOT and isnan(values[d.names[0]]):
+            return f"root {d.names[0]!r} has no solution at the prior mean ({at})"
     for state, equation in zip(model.states, model.dynamics, strict=True):
         if not np.isfinite(evaluate(equation, values)):
             return f"the dynamics of {state!r} have no finite value at the prior mean ({at})"
@@ -103,6 +107,9 @@ def singular_equation(
             there = dict(functions) | {STATION: station.place}
             here = with_values(values | dict(station.numbers), sensor.definitions, functions=there, model=model)
             if not np.isfinite(evaluate(equation, here)):
+                lost = next((d.names[0] for d in sensor.definitions if d.function == ROOT and isnan(here[d.names[0]])), None)
+                if lost is not None:
+                    return f"root {lost!r} of station {station.name!r} has no solution at the prior mean ({at})"
                 return f"component {component!r} of station {station.name!r} has no finite value at the prior mean ({at})"
     return ""
 

@@ -44,6 +44,7 @@ class Physics:
     components: dict[str, dict[str, Unit]] = field(default_factory=dict)
     numbers: dict[str, dict[str, Unit]] = field(default_factory=dict)
     definitions: dict[str, str] = field(default_factory=dict)
+    roots: dict[str, Any] = field(default_factory=dict)
     functions: dict[str, Any] = field(default_factory=dict)
     forces: ForceChoice | None = None
     dynamics: dict[str, str] = field(default_factory=dict)
@@ -53,13 +54,18 @@ class Physics:
     @property
     def known(self) -> set[str]:
         """Every name that has a value in equations of motion."""
-        own = {*self.units, *_names(self.definitions), TIME}
+        own = {*self.units, *self.defined, TIME}
         return own if self.forces is None else own | names_of(self.forces)
 
     @property
     def estimated(self) -> list[str]:
         """Everything that is estimated, in the order of `Model.names`."""
         return [*self.states, *self.memory, *self.constants]
+
+    @property
+    def defined(self) -> list[str]:
+        """Every name that definitions and roots give."""
+        return [*_names(self.definitions), *_provided(self.roots)]
 
     def factors(self, names: Collection[str]) -> list[float]:
         """SI factor of each of these states and parameters."""
@@ -88,8 +94,9 @@ def read_physics(file: Table, units: Units, epoch: Epoch | None = None, forces: 
     parameters = _parameters(file.table("parameters"), units, out)
     given = {} if forces is None or epoch is None else forces.functions(epoch)
     out.functions = {**given, **read_functions(file.table("functions"), epoch)}
-    known = {*out.known, *([STEP] if "step" in file else [])}
-    out.definitions = read_definitions(file.table("definitions"), known, out)
+    known, solved = {*out.known, *([STEP] if "step" in file else [])}, file.table("roots")
+    out.definitions = read_definitions(file.table("definitions"), {*known, *_provided(solved.data)}, out)
+    out.roots = _roots(solved, {*known, *out.known, *_provided(solved.data)}, out, out.functions)
     out.dynamics = _dynamics(file, out)
     sensors = [_sensor(name, table, units, out, epoch) for name, table in file.table("sensors").tables()]
     out.groups = _groups(file, out)
@@ -105,11 +112,20 @@ def _model(out: Physics, parameters: list[Parameter], sensors: list[Sensor], lab
     if out.forces is not None:
         dynamics = dynamics_of(out.forces, dynamics)
         seen = [name for sensor in sensors for name in sensor.free_names]
-        definitions = definitions_of(out.forces, definitions, [*dynamics.values(), *definitions.values(), *seen])
+        texts = [*dynamics.values(), *definitions.values(), *_texts(out.roots), *seen]
+        definitions = definitions_of(out.forces, definitions, texts)
     equations = [dynamics[s] for s in out.states]
     return Model(
-        out.states, equations, sensors, parameters, out.groups, labels, discrete, out.memory, definitions, functions
+        out.states, equations, sensors, parameters, out.groups, labels, discrete, out.memory, definitions, functions, out.roots
     )  # fmt: skip
+
+
+def _texts(roots: Mapping[str, Any]) -> list[str]:
+    """Every equation of roots."""
+    out: list[str] = []
+    for root in roots.values():
+        out += [root["root"], root["start"], *root["definitions"].values(), *_texts(root["roots"])]
+    return out
 
 
 def named_units(table: Table, key: str, units: Units, what: str) -> dict[str, Unit]:
@@ -290,7 +306,7 @@ def _sensor(name: str, table: Table, units: Units, out: Physics, epoch: Epoch | 
     known |= {*_provided(solved.data)}
     definitions = read_definitions(table.table("definitions"), known, out, OWN, outside)
     roots = _roots(solved, {*known, *_names(definitions)}, out, outside)
-    for clash in {*_names(definitions)} & (numbers.keys() | {*_names(out.definitions)}):
+    for clash in {*_names(definitions)} & (numbers.keys() | {*out.defined}):
         table.fault("definitions", f"names {clash!r}, which has a meaning already")
     components = table.table("components")
     if not components.data:

@@ -73,7 +73,8 @@ def _equations(model: Model) -> dict[str, Any]:
         "states": {s: model.unit(s) for s in model.states},
         "memory": dict(model.memory),
         "groups": {g: list(members) for g, members in model.groups},
-        "definitions": dict(model.definitions),
+        "definitions": _values(model.definitions),
+        "roots": {d.names[0]: _root(d) for d in model.definitions if d.function == ROOT},
         "step" if model.discrete else "dynamics": dict(zip(model.states, model.dynamics, strict=True)),
         "sensors": {s.name: _sensor(model, s) for s in model.sensors},
     }

@@ -40,11 +40,11 @@ class Rule:
         known = {*self._names, *self._given} | {name for d in model.definitions for name in d.provides}
         used = needed(self._equations, model.definitions)
         self._definitions = [
-            d for d in model.definitions if used & set(d.names) and needed(d.texts, model.definitions) <= known
+            d for d in model.definitions if used & set(d.provides) and needed(d.needs, model.definitions) <= known
         ]
-        self._functions = actual.functions
+        self._functions, self._model = actual.functions, model
         for text in self._equations:
-            check(text, [*self._names, *self._given, *(name for d in self._definitions for name in d.names)])
+            check(text, [*self._names, *self._given, *(name for d in self._definitions for name in d.provides)])
 
     def __str__(self) -> str:
         return " and ".join(f"{text} > 0" for text in self._equations)
@@ -53,8 +53,8 @@ class Rule:
         """For each of the states (M, n), whether all equations are above zero there, (M,); not where one has no value."""
         out = np.ones(len(x), dtype=bool)
         values = {**self._given, **dict(zip(self._names, x.T, strict=True))}
-        wanted = {name for d in self._definitions for name in d.names}
-        values = with_arrays(values, wanted, tuple(self._definitions), functions=self._functions)
+        wanted = {name for d in self._definitions for name in d.provides}
+        values = with_arrays(values, wanted, tuple(self._definitions), functions=self._functions, model=self._model)
         for text in self._equations:
             out &= np.asarray(evaluate_arrays(text, values)) > 0
         return out

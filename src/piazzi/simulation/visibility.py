@@ -42,7 +42,7 @@ def _visible(problem: Problem, station: Station, values: dict[str, Array | float
     layers: tuple[Definitions, ...] = (problem.model.definitions, sensor.definitions)
     functions = {**problem.functions, STATION: station.place}
     wanted = needed(sensor.visible, *layers)
-    known = with_arrays({**values, **station.numbers}, wanted, *layers, functions=functions)
+    known = with_arrays({**values, **station.numbers}, wanted, *layers, functions=functions, model=problem.model)
     return np.logical_and.reduce([np.asarray(evaluate_arrays(text, known)) > 0 for text in sensor.visible])  # type: ignore[no-any-return]
 
 

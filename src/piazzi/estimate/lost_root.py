@@ -1,0 +1,77 @@
+"""Which root of which station was not found, where an estimate cannot be used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from piazzi.kernels import KernelSpec, load_plain
+from piazzi.model import Model, Sensor
+from piazzi.model.functions import ROOT
+from piazzi.problem import Problem, Tracking
+from piazzi.problem.checks import Array
+
+MOST_EPOCHS = 100  # that are looked at
+
+
+def lost_root(problem: Problem, tracking: Tracking, mean: Array) -> str:
+    """Words for the first root without a solution at the first states (K, n) that are none, or after the last that is one.
+
+    "" where all are found, or the model has none.
+    """
+    model = problem.model
+    if not any(_roots(model, sensor) for sensor in model.sensors):
+        return ""
+    try:
+        return _lost(problem, tracking, mean)
+    except (ValueError, ArithmeticError):  # the failure is told without it
+        return ""
+
+
+def _lost(problem: Problem, tracking: Tracking, mean: Array) -> str:
+    spec = problem.spec("transition", "functions")
+    probes = _probes(problem.model)
+    kernel = load_plain(KernelSpec(replace(problem.model, sensors=probes), spec.scheme, spec.fragments))
+    finite = np.asarray(np.isfinite(mean).all(axis=1))
+    begin = 0 if finite.all() else int(np.argmin(finite))
+    given, stations = problem.given_over(*tracking.times[[0, -1]]), tracking.stations_of(problem)
+    for k, x in _states(problem, tracking, mean, range(begin, min(begin + MOST_EPOCHS, len(finite)))):
+        t = float(tracking.times[k])
+        for row in range(tracking.first_row[k], tracking.first_row[k + 1]):
+            s = int(stations[row])
+            out = np.empty((1, max(p.width for p in probes)))
+            numbers, sensor = problem.station_numbers[s], int(problem.station_sensor[s])
+            kernel.evaluate_measurement(1, sensor, np.array([t]), x[None], given, numbers, out)
+            found = _roots(problem.model, problem.model.sensors[sensor])
+            for name, value in zip(found, out[0].tolist(), strict=False):
+                if np.isnan(value):
+                    return f"root {name!r} of station {problem.stations[s].name!r} has no solution at t = {t:g} s"
+    return ""
+
+
+def _states(problem: Problem, tracking: Tracking, mean: Array, epochs: range) -> Iterator[tuple[int, Array]]:
+    """Epochs with their states, those that are none as foretold by the epoch before, or by the prior."""
+    start = epochs.start
+    t, x = (float(tracking.times[start - 1]), mean[start - 1]) if start else (problem.prior_start(tracking.times), problem.mean)
+    for k in epochs:
+        now = float(tracking.times[k])
+        x = mean[k] if np.isfinite(mean[k]).all() else problem.step(x, now - t, t)[0] if now > t else x
+        t = now
+        yield k, np.ascontiguousarray(x)
+
+
+def _roots(model: Model, sensor: Sensor) -> list[str]:
+    """Names of all roots, in the order in which they are solved."""
+    return [d.names[0] for d in (*model.definitions, *sensor.definitions) if d.function == ROOT]
+
+
+def _probes(model: Model) -> tuple[Sensor, ...]:
+    """Sensors that see the roots, and behind them what they see else, so that they need the same numbers of a station."""
+    out = []
+    for sensor in model.sensors:
+        roots = {f"root_{i}": name for i, name in enumerate(_roots(model, sensor))}
+        seen = {f"seen_{i}": equation for i, equation in enumerate(sensor.equations)}
+        out.append(Sensor(sensor.name, roots | seen, definitions=sensor.definitions, visible=sensor.visible))
+    return tuple(out)
