@@ -33,7 +33,11 @@ def base(fragment):
         "prior": {"mean": X, "sigma": [10.0] * 3 + [0.1] * 3},
         "times": {"step": 60.0, "count": 3},
     }
-    if "earth" not in fragment:
+    if "prior" in fragment:
+        del out["prior"]
+    if "mean" not in fragment.get("prior", {"mean": X}):  # of an orbit
+        out["earth"] = {"degree": 2}
+    elif "earth" not in fragment:
         out["states"] = [*AXES, *(f"v{a}" for a in AXES)]
         out["dynamics"] = {a: f"v{a}" for a in AXES} | {f"v{a}": f"-1e-6*{a}" for a in AXES}
     if "roots" in fragment.get("sensors", {}).get("range", {}):  # the light time of a field's and a body's scenario
