@@ -1,0 +1,259 @@
+"""Initial orbits: every orbit that the first stretch of a tracking allows, refined by the full model and weighed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from piazzi.determination.sights import observers, rows_of
+from piazzi.earth import Epoch
+from piazzi.earth.constants import GM
+from piazzi.estimate.batch import BatchLeastSquares
+from piazzi.estimate.estimator import Estimate
+from piazzi.orbit import propagate_kepler
+from piazzi.orbit.fits import Rows
+from piazzi.orbit.modes import SAME, Mode, Search, two_body_modes
+from piazzi.orbit.starts import Region
+from piazzi.problem import Gaussian, Problem, Tracking
+from piazzi.problem.checks import Array
+from piazzi.simulation import wrapped
+
+EARTH = Region(GM["earth"], 6378136.3 + 100e3, 1e9)
+STRETCH = 4 * 3600.0  # s: passes of some low revolutions, a good part of a night
+LONGER = 4.0  # how much longer each next stretch is
+ENOUGH = 5  # rows of a stretch
+MOST = 6  # two-body orbits that are refined
+WIDE = 0.3  # of distance and speed: the sigma of where a fit begins
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitMode:
+    """One orbit that fits.
+
+    Attributes
+    ----------
+    epoch : the first row that was used
+    mean : (6,) m, m/s, on the axes of the problem
+    covariance : (6, 6)
+    probability : among all that fit, by Laplace's approximation of the evidence, before the full model if none of it ended
+    weighted_rms : of the residuals in their sigmas
+    rows : how many it was fitted to
+    """
+
+    epoch: Epoch
+    mean: Array
+    covariance: Array
+    probability: float
+    weighted_rms: float
+    rows: int
+
+
+@dataclass(frozen=True, eq=False)
+class InitialOrbits:
+    """Orbits that fit, the most probable first.
+
+    Attributes
+    ----------
+    modes : the orbits
+    starts, fits : of two-body motion, from how many starts, and how many ended
+    apart : where the first two part next: an instant, the station that sees it, and by how many metres; None where there is one
+    """
+
+    modes: tuple[OrbitMode, ...]
+    starts: int
+    fits: int
+    apart: tuple[Epoch, str, float] | None = None
+
+    def __str__(self) -> str:
+        lines = [f"{len(self.modes)} orbits fit ({self.fits} fits from {self.starts} starts)"]
+        for mode in self.modes:
+            r, v = np.linalg.norm(mode.mean[:3]) / 1e3, np.linalg.norm(mode.mean[3:])
+            lines.append(
+                f"  probability {mode.probability:.3f}: {r:,.1f} km from the centre at {v:,.1f} m/s on {mode.epoch.to('UTC')} UTC,"
+                f" weighted RMS {mode.weighted_rms:.2f} of {mode.rows} rows"
+            )
+        if self.apart is not None:
+            lines.append(
+                f"The first two are {self.apart[2] / 1e3:,.1f} km apart for {self.apart[1]} at {self.apart[0].to('UTC')} UTC"
+            )
+        return "\n".join(lines)
+
+
+def initial_orbits(problem: Problem, tracking: Tracking, region: Region = EARTH) -> InitialOrbits:
+    """All orbits that fit a tracking, from any mix of sensors, without a guess.
+
+    Every classical method that the rows allow, and a sample of the admissible region, start two-body fits; the best are refined
+    by batch least squares of the problem itself over longer and longer stretches of the tracking, merged and weighed.
+
+    Parameters
+    ----------
+    problem : states x, y, z, vx, vy, vz (m, m/s), with an epoch; its prior is not used
+    tracking : rows of positions, distances, their rates, or directions
+    region : which orbits are admissible
+
+    Raises
+    ------
+    ValueError
+        Where no row says where the body is, or nothing fits.
+    """
+    if problem.model.states[:6] != ("x", "y", "z", "vx", "vy", "vz") or problem.epoch is None:
+        raise ValueError("initial orbits need a problem with states x, y, z, vx, vy, vz and an epoch")
+    rows, index = rows_of(problem, tracking)
+    first = _stretch(rows, STRETCH)
+    search = two_body_modes(rows.of(first), region)
+    if not search.modes:
+        raise ValueError(f"no orbit fits the {len(np.unique(index[first]))} rows of the first stretch ({search.starts} starts)")
+    inside = [m for m in search.modes if m.admissible] or list(search.modes)
+    begin = float(rows.t[first].min())
+    refined = [*_refined(problem, tracking, search, inside[:MOST], begin, float(rows.t[first].max()), region)]
+    modes = _weighed(refined) or tuple(_unrefined(problem, search, inside[:MOST], len(np.unique(index[first]))))
+    return InitialOrbits(
+        modes, search.starts, search.fits, _apart(problem, tracking, modes, region) if len(modes) > 1 else None
+    )
+
+
+def _stretch(rows: Rows, length: float) -> Array:
+    """Indices of the stretch of so many seconds that holds most rows, the earliest of equals; longer where it holds too few."""
+    order = np.argsort(rows.t, kind="stable")
+    t = rows.t[order]
+    while True:
+        last = np.searchsorted(t, t + length, side="right")
+        held = last - np.arange(len(t))
+        k = int(np.argmax(held))
+        if held[k] >= min(ENOUGH, len(t)) or length > t[-1] - t[0]:
+            return order[k : last[k]]
+        length *= LONGER
+
+
+@dataclass(frozen=True, eq=False)
+class _Refined:
+    state: Array
+    covariance: Array
+    square: float
+    count: int
+    epoch: Epoch
+
+
+def _refined(
+    problem: Problem, tracking: Tracking, search: Search, modes: list[Mode], begin: float, end: float, region: Region
+) -> Iterator[_Refined]:
+    """Fits of the problem itself, over the stretch from `begin` to `end` and then over longer ones."""
+    times = tracking.row_times
+    for mode in modes:
+        r, v = propagate_kepler(mode.state[:3], mode.state[3:], region.mu, begin - search.epoch)
+        state, low, high, best = np.concatenate([r, v]), begin, end, None
+        while True:
+            keep = (times >= low) & (times <= high)
+            found = _fit(problem, tracking, keep, state)
+            if found is None:
+                break
+            estimate, best = found
+            state = estimate.mean[0, :6]
+            if keep.all():
+                break
+            span = (LONGER - 1) * max(high - low, 60.0)
+            at, low, high = float(estimate.times[0]), low - span, high + span
+            first = float(times[times >= low].min())
+            if first < at:
+                r, v = propagate_kepler(state[:3], state[3:], region.mu, first - at)
+                state = np.concatenate([r, v])
+        if best is not None:
+            yield best
+
+
+def _fit(problem: Problem, tracking: Tracking, keep: Array, state: Array) -> tuple[Estimate, _Refined] | None:
+    times, constants = tracking.row_times[keep], problem.model.n - 6
+    sigma = np.concatenate([np.full(3, WIDE * np.linalg.norm(state[:3])), np.full(3, WIDE * np.linalg.norm(state[3:]))])
+    few = Tracking(times, tracking.values[keep], tracking.row_stations[keep], epoch=tracking.epoch)
+    start = np.concatenate([state, problem.mean[6:]])
+    prior = Gaussian(state, np.diag(sigma**2))
+    posed = replace(problem, prior=prior, prior_time=float(times.min()))
+    try:
+        estimate = BatchLeastSquares(start=start, max_iterations=30, tolerance=1e-3).estimate(posed, few)
+    except ValueError:
+        return None
+    if not estimate.success or constants < 0:
+        return None
+    square, count = _square(posed, few, estimate)
+    epoch = problem.epoch + float(estimate.times[0])
+    return estimate, _Refined(estimate.mean[0, :6], estimate.covariance[0, :6, :6], square, count, epoch)
+
+
+def _square(problem: Problem, tracking: Tracking, estimate: Estimate) -> tuple[float, int]:
+    """Sum of squares of whitened residuals, and how many there are."""
+    which, times = tracking.stations_of(problem), tracking.row_times
+    states = estimate.mean[np.searchsorted(estimate.times, times)]
+    total, count = 0.0, 0
+    for s, station in enumerate(problem.stations):
+        own = which == s
+        if own.any():
+            m = len(station.noise)
+            z = tracking.values[own, :m]
+            off = wrapped(problem, which[own], z - problem.measure(station.name, states[own], times[own]))
+            noise = np.asarray(station.noise)
+            sigma = np.sqrt(np.diag(noise) if noise.ndim == 2 else noise)
+            there = np.isfinite(off)
+            total += float(np.sum((np.where(there, off, 0.0) / sigma) ** 2))
+            count += int(there.sum())
+    return total, count
+
+
+def _weighed(found: list[_Refined]) -> tuple[OrbitMode, ...]:
+    """The different ones, with probabilities; only those that were fitted to the most rows count."""
+    most = max((f.count for f in found), default=0)
+    ordered = sorted((f for f in found if f.count == most), key=lambda f: f.square)
+    kept: list[_Refined] = []
+    for one in ordered:
+        if all(_apart_in_sigmas(one, other) > SAME for other in kept):
+            kept.append(one)
+    if not kept:
+        return ()
+    scale = max(kept[0].square / max(most - 6, 1), 1.0)  # forces that are left out make all of them worse
+    score = np.array([-0.5 * f.square / scale + 0.5 * np.linalg.slogdet(f.covariance)[1] for f in kept])
+    weight = np.exp(score - score.max())
+    share = weight / weight.sum()
+    return tuple(
+        OrbitMode(f.epoch, f.state, f.covariance, float(p), float(np.sqrt(f.square / max(f.count, 1))), f.count)
+        for p, f in sorted(zip(share.tolist(), kept, strict=True), key=lambda pair: -pair[0])
+        if p > 1e-6
+    )
+
+
+def _apart_in_sigmas(one: _Refined, other: _Refined) -> float:
+    root = np.linalg.cholesky(other.covariance + 1e-12 * np.diag(np.diag(other.covariance)))
+    return float(np.sum(np.linalg.solve(root, one.state - other.state) ** 2))
+
+
+def _unrefined(problem: Problem, search: Search, modes: list[Mode], rows: int) -> Iterator[OrbitMode]:
+    """Two-body modes as they are, where the full model ended from none."""
+    epoch = problem.epoch + search.epoch
+    for mode in modes:
+        half = np.linalg.lstsq(mode.root[:6, :6], np.eye(6), rcond=None)[0]
+        rms = float(np.sqrt(mode.square / max(rows, 1)))
+        yield OrbitMode(epoch, mode.state, half @ half.T, mode.probability, rms, rows)
+
+
+def _apart(
+    problem: Problem, tracking: Tracking, modes: tuple[OrbitMode, ...], region: Region
+) -> tuple[Epoch, str, float] | None:
+    """Where the first two are farthest apart within a day after the last row, seen by a station that has one above its horizon."""
+    last = float(tracking.row_times.max())
+    t = last + np.arange(60.0, 86400.0, 120.0)
+    paths = []
+    for mode in modes[:2]:
+        begin = mode.epoch - problem.epoch
+        paths.append(propagate_kepler(mode.mean[:3], mode.mean[3:], region.mu, t - begin)[0])
+    best: tuple[float, float, str] | None = None
+    for station in problem.stations:
+        if station.place is None:
+            continue
+        place, _ = observers(problem, station, t)
+        up = place / np.linalg.norm(place, axis=1)[:, None]
+        above = np.any([np.sum((p - place) * up, axis=1) > 0.1 * np.linalg.norm(p - place, axis=1) for p in paths], axis=0)
+        away = np.where(above, np.linalg.norm(paths[0] - paths[1], axis=1), 0.0)
+        k = int(np.argmax(away))
+        if away[k] > 0 and (best is None or away[k] > best[0]):
+            best = float(away[k]), float(t[k]), station.name
+    return None if best is None else (problem.epoch + best[1], best[2], best[0])

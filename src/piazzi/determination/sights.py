@@ -1,0 +1,190 @@
+"""Rows of tracking as vectors without light time, media and biases: what two-body fits of unknown orbits start from.
+
+What a sensor adds to plain geometry hardly depends on the orbit.  It is taken from the sensor itself: where it would see a body
+that stands still along the measured direction.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from piazzi.earth.geodetic import position_to_geodetic
+from piazzi.earth.rotation import rotation
+from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, RATE, Rows
+from piazzi.problem import Problem, Station, Tracking
+from piazzi.problem.checks import Array
+from piazzi.simulation import wrapped
+
+FAR = 1e7  # m: where a body is put to ask a sensor what it adds
+PLACES = ("position_x", "position_y", "position_z")
+PAIRS = (("azimuth", "elevation"), ("right_ascension", "declination"))
+ROUNDS = 3
+
+
+def rows_of(problem: Problem, tracking: Tracking, most: int = 600) -> tuple[Rows, Array]:
+    """At most so many rows of each station as vectors, and for each the row of the tracking.
+
+    Raises
+    ------
+    ValueError
+        Where no sensor measures a distance, its rate, a direction or a position.
+    """
+    which = tracking.stations_of(problem)
+    t, z = tracking.row_times, tracking.values
+    found: list[tuple[Rows, Array]] = []
+    for s, station in enumerate(problem.stations):
+        own = np.flatnonzero(which == s)
+        if len(own) > most:
+            own = own[np.unique(np.linspace(0, len(own) - 1, most).astype(int))]
+        if len(own):
+            found += _of_station(problem, station, t[own], z[own], own)
+    if not found:
+        sensors = ", ".join(s.name for s in problem.model.sensors)
+        raise ValueError(
+            f"no sensor ({sensors}) measures a distance, its rate, a direction or a position: give an orbit to begin"
+        )
+    rows = [r for r, _ in found]
+    names = ("t", "kind", "observer", "observer_velocity", "value", "sigma", "across", "shared")
+    joined = Rows(**{name: np.concatenate([getattr(r, name) for r in rows]) for name in names})
+    return joined, np.concatenate([j for _, j in found])
+
+
+def _of_station(problem: Problem, station: Station, t: Array, z: Array, own: Array) -> list[tuple[Rows, Array]]:
+    sensor = next(s for s in problem.model.sensors if s.name == station.sensor)
+    at = {name: i for i, name in enumerate(sensor.components)}
+    noise = np.asarray(station.noise)
+    variance = np.diag(noise) if noise.ndim == 2 else noise
+    sigma = np.sqrt(variance)
+    if set(PLACES) <= set(at):
+        return _fixes(problem, station, t, z, own, [at[p] for p in PLACES], sigma)
+    if station.place is None:
+        return []
+    place, velocity = observers(problem, station, t)
+    out: list[tuple[Rows, Array]] = []
+    pair = next((p for p in PAIRS if set(p) <= set(at)), None)
+    u = _directions(problem, station, t, z, place, pair, [at[p] for p in pair]) if pair else None
+    if u is not None and pair is not None:
+        i, j = (at[p] for p in pair)
+        east, _ = _frame(u, _pole(problem, station, t, pair), pair)
+        on_sky = pair[0] in dict(getattr(sensor, "on_sky", ()) or ())
+        first = np.full(len(t), sigma[i]) * (1.0 if on_sky else np.abs(np.cos(z[:, j])))
+        out.append(_rows(DIRECTION, t, place, velocity, u, np.stack([first, np.full(len(t), sigma[j])], -1), own, east))
+    if "range" in at:
+        up = place / np.linalg.norm(place, axis=1)[:, None]
+        along = np.where(np.isfinite(u).all(axis=1)[:, None], u, up) if u is not None else up
+        i = at["range"]
+        state = _states(problem, place + z[:, i : i + 1] * along)
+        with np.errstate(invalid="ignore"):
+            added = problem.measure(station.name, np.nan_to_num(state), t)[:, i] - z[:, i]
+        value = np.zeros((len(t), 3))
+        value[:, 0] = z[:, i] - np.where(np.abs(added) < 1e3, added, 0.0)
+        out.append(_rows(RANGE, t, place, velocity, value, np.full((len(t), 2), sigma[i]), own))
+    if "range_rate" in at:
+        value = np.zeros((len(t), 3))
+        value[:, 0] = z[:, at["range_rate"]]
+        out.append(_rows(RATE, t, place, velocity, value, np.full((len(t), 2), sigma[at["range_rate"]]), own))
+    return [(rows.of(keep), own[keep]) for rows, keep in ((r, np.isfinite(r.value).all(axis=1)) for r, _ in out) if keep.any()]
+
+
+def _rows(
+    kind: int, t: Array, place: Array, velocity: Array, value: Array, sigma: Array, own: Array, across: Array | None = None
+) -> tuple[Rows, Array]:
+    J = len(t)
+    return Rows(
+        t=t, kind=np.full(J, float(kind)), observer=place, observer_velocity=velocity, value=value, sigma=sigma,
+        across=np.tile([1.0, 0.0, 0.0], (J, 1)) if across is None else across, shared=np.zeros(J),
+    ), own  # fmt: skip
+
+
+def _fixes(
+    problem: Problem, station: Station, t: Array, z: Array, own: Array, at: list[int], sigma: Array
+) -> list[tuple[Rows, Array]]:
+    """Positions on the axes of the problem: what the sensor makes of a body at the centre plus what was measured, undone."""
+    keep = np.isfinite(z[:, at]).all(axis=1)
+    if not keep.any():
+        return []
+    t, z, own = t[keep], z[keep], own[keep]
+    columns = [problem.measure(station.name, _states(problem, np.tile(FAR * e, (len(t), 1))), t)[:, at] for e in np.eye(3)]
+    turn = np.stack(columns, axis=-1) / FAR
+    value = np.linalg.solve(turn, z[:, at][..., None])[..., 0]
+    nothing = np.zeros((len(t), 3))
+    return [_rows(POSITION, t, nothing, nothing, value, np.full((len(t), 2), float(np.max(sigma[at]))), own)]
+
+
+def observers(problem: Problem, station: Station, t: Array) -> tuple[Array, Array]:
+    """Position and velocity (K, 3) of a station on the axes of the problem."""
+    recipe: Any = station.place
+    half = 0.5
+    before, here, after = (recipe.at([problem.epoch + float(v) for v in t + shift]) for shift in (-half, 0.0, half))
+    return here, (after - before) / (2 * half)
+
+
+def _directions(
+    problem: Problem, station: Station, t: Array, z: Array, place: Array, pair: tuple[str, str], at: list[int]
+) -> Array:
+    """Unit vectors (K, 3) along which the sensor measures what was measured; NaN where nothing was."""
+    good = np.isfinite(z[:, at]).all(axis=1)
+    out = np.full((len(t), 3), np.nan)
+    if not good.any():
+        return out
+    t, z, place = t[good], z[good], place[good]
+    lon, lat = z[:, at[0]], z[:, at[1]]
+    if pair[0] == "azimuth":
+        u = _from_horizon(problem, station, t, lon, lat)
+    else:
+        u = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], -1)
+    which, pole = np.full(len(t), problem.station_index(station.name)), _pole(problem, station, t, pair)
+    for _ in range(ROUNDS):
+        seen = problem.measure(station.name, _states(problem, place + FAR * u), t)
+        off = wrapped(problem, which, z[:, : seen.shape[1]] - seen)[:, at]
+        east, north = _frame(u, pole, pair)
+        u = u + (off[:, :1] * np.cos(lat)[:, None]) * east + off[:, 1:] * north
+        u /= np.linalg.norm(u, axis=1)[:, None]
+    out[good] = u
+    return out
+
+
+def _from_horizon(problem: Problem, station: Station, t: Array, azimuth: Array, elevation: Array) -> Array:
+    """Directions on the axes of the GCRF, from north through east and up."""
+    turn, (east, north, up) = _horizon(problem, station, t)
+    local = (
+        (np.cos(elevation) * np.sin(azimuth))[:, None] * east
+        + (np.cos(elevation) * np.cos(azimuth))[:, None] * north
+        + np.sin(elevation)[:, None] * up
+    )
+    return np.asarray((turn @ local[..., None])[..., 0])
+
+
+def _horizon(problem: Problem, station: Station, t: Array) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Matrices (K, 3, 3) from the axes of the Earth to those of the problem, and east, north and up at the station."""
+    recipe: Any = station.place
+    epochs = [problem.epoch + float(v) for v in t]
+    longitude, latitude, _ = position_to_geodetic(recipe.station.position(epochs[:1])[0])
+    c, s, cl, sl = np.cos(longitude), np.sin(longitude), np.cos(latitude), np.sin(latitude)
+    axes = np.array([-s, c, 0.0]), np.array([-sl * c, -sl * s, cl]), np.array([cl * c, cl * s, sl])
+    return rotation("ITRF", "GCRF", epochs, recipe.eop), axes
+
+
+def _pole(problem: Problem, station: Station, t: Array, pair: tuple[str, str]) -> Array:
+    """Unit vectors (K, 3) towards which the second angle grows."""
+    if pair[0] != "azimuth":
+        return np.tile([0.0, 0.0, 1.0], (len(t), 1))
+    turn, (_, _, up) = _horizon(problem, station, t)
+    return np.asarray(turn @ up)
+
+
+def _frame(u: Array, pole: Array, pair: tuple[str, str]) -> tuple[Array, Array]:
+    """Unit vectors (K, 3) along which the first angle and the second grow."""
+    first = np.cross(u, pole) if pair[0] == "azimuth" else np.cross(pole, u)
+    first = first / np.maximum(np.linalg.norm(first, axis=1)[:, None], 1e-12)
+    second = pole - np.sum(pole * u, axis=1)[:, None] * u
+    return first, np.asarray(second / np.maximum(np.linalg.norm(second, axis=1)[:, None], 1e-12))
+
+
+def _states(problem: Problem, position: Array) -> Array:
+    """States (K, n) at rest there, constants at their means."""
+    out = np.tile(problem.mean, (len(position), 1))
+    out[:, :3], out[:, 3:6] = position, 0.0
+    return out
