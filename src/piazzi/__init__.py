@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from piazzi import earth, formats, orbit
     from piazzi.determination.determining import determine
+    from piazzi.determination.initial import InitialOrbits, initial_orbits
     from piazzi.determination.result import Determination
     from piazzi.determination.unknowns import Estimated
     from piazzi.earth import Epoch
@@ -119,6 +120,7 @@ _WHERE = {
         "piazzi.study": "Study read_store",
         "piazzi.present.report": "write_report",
         "piazzi.determination.determining": "determine",
+        "piazzi.determination.initial": "InitialOrbits initial_orbits",
         "piazzi.determination.result": "Determination",
         "piazzi.determination.unknowns": "Estimated",
         "": "earth formats orbit",
@@ -128,16 +130,17 @@ _WHERE = {
 
 __version__ = "0.1.0"
 __all__ = [
-    "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Determination", "Discrete", "DormandPrince",
-    "DormandPrince5", "Ephemeris", "Epoch", "Estimate", "Estimated", "Euler", "ExtendedKalmanFilter", "FactorGraph",
-    "Forecast", "Function", "GaussJackson", "Gaussian", "Heun", "Huber", "Integrator", "Interpolation", "Kepler",
-    "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre", "Midpoint", "Model", "Observability", "Observations",
-    "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise", "Propagation", "Ralston", "RungeKutta", "RungeKutta4",
-    "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter", "Station", "Study", "Table",
-    "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade", "choose_substeps", "compare",
-    "determine", "difference", "earth", "formats", "kepler_transition", "load", "observability", "orbit", "passes", "predict",
-    "propagate", "propagate_kepler", "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning",
-    "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
+    "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Determination", "Discrete",
+    "DormandPrince", "DormandPrince5", "Ephemeris", "Epoch", "Estimate", "Estimated", "Euler", "ExtendedKalmanFilter",
+    "FactorGraph", "Forecast", "Function", "GaussJackson", "Gaussian", "Heun", "Huber", "InitialOrbits", "Integrator",
+    "Interpolation", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre", "Midpoint", "Model",
+    "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise", "Propagation", "Ralston",
+    "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter",
+    "Station", "Study", "Table", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade",
+    "choose_substeps", "compare", "determine", "difference", "earth", "formats", "initial_orbits", "kepler_transition",
+    "load", "observability", "orbit", "passes", "predict", "propagate", "propagate_kepler", "read_ephemeris", "read_store",
+    "read_tracking", "simulate", "step_warning", "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at",
+    "write_report",
 ]  # fmt: skip
 
 

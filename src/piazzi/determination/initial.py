@@ -10,15 +10,16 @@ import numpy as np
 from piazzi.determination.sights import observers, rows_of
 from piazzi.earth import Epoch
 from piazzi.earth.constants import GM
-from piazzi.estimate.batch import BatchLeastSquares
+from piazzi.estimate.batch import BatchLeastSquares, undisturbed
 from piazzi.estimate.estimator import Estimate
+from piazzi.evaluate.information import along
 from piazzi.orbit import propagate_kepler
 from piazzi.orbit.fits import Rows
 from piazzi.orbit.modes import SAME, Mode, Search, two_body_modes
 from piazzi.orbit.starts import Region
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array
-from piazzi.simulation import wrapped
+from piazzi.problem.inputs import prepare
 
 EARTH = Region(GM["earth"], 6378136.3 + 100e3, 1e9)
 STRETCH = 4 * 3600.0  # s: passes of some low revolutions, a good part of a night
@@ -70,14 +71,11 @@ class InitialOrbits:
         lines = [f"{len(self.modes)} orbits fit ({self.fits} fits from {self.starts} starts)"]
         for mode in self.modes:
             r, v = np.linalg.norm(mode.mean[:3]) / 1e3, np.linalg.norm(mode.mean[3:])
-            lines.append(
-                f"  probability {mode.probability:.3f}: {r:,.1f} km from the centre at {v:,.1f} m/s on {mode.epoch.to('UTC')} UTC,"
-                f" weighted RMS {mode.weighted_rms:.2f} of {mode.rows} rows"
-            )
+            where = f"{r:,.1f} km from the centre at {v:,.1f} m/s on {mode.epoch.to('UTC')}"
+            lines.append(f"  probability {mode.probability:.3f}: {where}, weighted RMS {mode.weighted_rms:.2f} of {mode.rows}")
         if self.apart is not None:
-            lines.append(
-                f"The first two are {self.apart[2] / 1e3:,.1f} km apart for {self.apart[1]} at {self.apart[0].to('UTC')} UTC"
-            )
+            when, station, metres = self.apart
+            lines.append(f"The first two are {metres / 1e3:,.1f} km apart for {station} on {when.to('UTC')}")
         return "\n".join(lines)
 
 
@@ -109,9 +107,8 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region = EARTH)
     begin = float(rows.t[first].min())
     refined = [*_refined(problem, tracking, search, inside[:MOST], begin, float(rows.t[first].max()), region)]
     modes = _weighed(refined) or tuple(_unrefined(problem, search, inside[:MOST], len(np.unique(index[first]))))
-    return InitialOrbits(
-        modes, search.starts, search.fits, _apart(problem, tracking, modes, region) if len(modes) > 1 else None
-    )
+    apart = _apart(problem, tracking, modes, region) if len(modes) > 1 else None
+    return InitialOrbits(modes, search.starts, search.fits, apart)
 
 
 def _stretch(rows: Rows, length: float) -> Array:
@@ -183,21 +180,10 @@ def _fit(problem: Problem, tracking: Tracking, keep: Array, state: Array) -> tup
 
 def _square(problem: Problem, tracking: Tracking, estimate: Estimate) -> tuple[float, int]:
     """Sum of squares of whitened residuals, and how many there are."""
-    which, times = tracking.stations_of(problem), tracking.row_times
-    states = estimate.mean[np.searchsorted(estimate.times, times)]
-    total, count = 0.0, 0
-    for s, station in enumerate(problem.stations):
-        own = which == s
-        if own.any():
-            m = len(station.noise)
-            z = tracking.values[own, :m]
-            off = wrapped(problem, which[own], z - problem.measure(station.name, states[own], times[own]))
-            noise = np.asarray(station.noise)
-            sigma = np.sqrt(np.diag(noise) if noise.ndim == 2 else noise)
-            there = np.isfinite(off)
-            total += float(np.sum((np.where(there, off, 0.0) / sigma) ** 2))
-            count += int(there.sum())
-    return total, count
+    exact = problem if problem.is_noise_free else undisturbed(problem)
+    left = along(exact, prepare(exact, tracking), estimate.mean).innovations
+    there = np.isfinite(left)
+    return float(np.sum(left[there] ** 2)), int(there.sum())
 
 
 def _weighed(found: list[_Refined]) -> tuple[OrbitMode, ...]:
@@ -238,7 +224,7 @@ def _unrefined(problem: Problem, search: Search, modes: list[Mode], rows: int) -
 def _apart(
     problem: Problem, tracking: Tracking, modes: tuple[OrbitMode, ...], region: Region
 ) -> tuple[Epoch, str, float] | None:
-    """Where the first two are farthest apart within a day after the last row, seen by a station that has one above its horizon."""
+    """Where the first two are farthest apart within a day after the last row, for a station that has one above its horizon."""
     last = float(tracking.row_times.max())
     t = last + np.arange(60.0, 86400.0, 120.0)
     paths = []

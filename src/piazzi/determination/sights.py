@@ -18,7 +18,7 @@ from piazzi.problem.checks import Array
 from piazzi.simulation import wrapped
 
 FAR = 1e7  # m: where a body is put to ask a sensor what it adds
-PLACES = ("position_x", "position_y", "position_z")
+PLACES = (("position_x", "position_y", "position_z"), ("px", "py", "pz"))
 PAIRS = (("azimuth", "elevation"), ("right_ascension", "declination"))
 ROUNDS = 3
 
@@ -43,7 +43,7 @@ def rows_of(problem: Problem, tracking: Tracking, most: int = 600) -> tuple[Rows
     if not found:
         sensors = ", ".join(s.name for s in problem.model.sensors)
         raise ValueError(
-            f"no sensor ({sensors}) measures a distance, its rate, a direction or a position: give an orbit to begin"
+            f"no sensor ({sensors}) measures distances, their rates, directions or positions: give an orbit to begin"
         )
     rows = [r for r, _ in found]
     names = ("t", "kind", "observer", "observer_velocity", "value", "sigma", "across", "shared")
@@ -57,34 +57,35 @@ def _of_station(problem: Problem, station: Station, t: Array, z: Array, own: Arr
     noise = np.asarray(station.noise)
     variance = np.diag(noise) if noise.ndim == 2 else noise
     sigma = np.sqrt(variance)
-    if set(PLACES) <= set(at):
-        return _fixes(problem, station, t, z, own, [at[p] for p in PLACES], sigma)
+    for place in PLACES:
+        if set(place) <= set(at):
+            return _fixes(problem, station, t, z, own, [at[p] for p in place], sigma)
     if station.place is None:
         return []
-    place, velocity = observers(problem, station, t)
+    stands, velocity = observers(problem, station, t)
     out: list[tuple[Rows, Array]] = []
     pair = next((p for p in PAIRS if set(p) <= set(at)), None)
-    u = _directions(problem, station, t, z, place, pair, [at[p] for p in pair]) if pair else None
+    u = _directions(problem, station, t, z, stands, pair, [at[p] for p in pair]) if pair else None
     if u is not None and pair is not None:
         i, j = (at[p] for p in pair)
         east, _ = _frame(u, _pole(problem, station, t, pair), pair)
         on_sky = pair[0] in dict(getattr(sensor, "on_sky", ()) or ())
         first = np.full(len(t), sigma[i]) * (1.0 if on_sky else np.abs(np.cos(z[:, j])))
-        out.append(_rows(DIRECTION, t, place, velocity, u, np.stack([first, np.full(len(t), sigma[j])], -1), own, east))
+        out.append(_rows(DIRECTION, t, stands, velocity, u, np.stack([first, np.full(len(t), sigma[j])], -1), own, east))
     if "range" in at:
-        up = place / np.linalg.norm(place, axis=1)[:, None]
-        along = np.where(np.isfinite(u).all(axis=1)[:, None], u, up) if u is not None else up
+        up = stands / np.linalg.norm(stands, axis=1)[:, None]
+        along = up if u is None else np.where(np.isfinite(u).all(axis=1, keepdims=True), u, up)
         i = at["range"]
-        state = _states(problem, place + z[:, i : i + 1] * along)
+        state = _states(problem, stands + z[:, i : i + 1] * along)
         with np.errstate(invalid="ignore"):
             added = problem.measure(station.name, np.nan_to_num(state), t)[:, i] - z[:, i]
         value = np.zeros((len(t), 3))
         value[:, 0] = z[:, i] - np.where(np.abs(added) < 1e3, added, 0.0)
-        out.append(_rows(RANGE, t, place, velocity, value, np.full((len(t), 2), sigma[i]), own))
+        out.append(_rows(RANGE, t, stands, velocity, value, np.full((len(t), 2), sigma[i]), own))
     if "range_rate" in at:
         value = np.zeros((len(t), 3))
         value[:, 0] = z[:, at["range_rate"]]
-        out.append(_rows(RATE, t, place, velocity, value, np.full((len(t), 2), sigma[at["range_rate"]]), own))
+        out.append(_rows(RATE, t, stands, velocity, value, np.full((len(t), 2), sigma[at["range_rate"]]), own))
     return [(rows.of(keep), own[keep]) for rows, keep in ((r, np.isfinite(r.value).all(axis=1)) for r, _ in out) if keep.any()]
 
 
@@ -138,7 +139,9 @@ def _directions(
     which, pole = np.full(len(t), problem.station_index(station.name)), _pole(problem, station, t, pair)
     for _ in range(ROUNDS):
         seen = problem.measure(station.name, _states(problem, place + FAR * u), t)
-        off = wrapped(problem, which, z[:, : seen.shape[1]] - seen)[:, at]
+        full = np.full_like(z, np.nan)
+        full[:, : seen.shape[1]] = z[:, : seen.shape[1]] - seen
+        off = wrapped(problem, which, full)[:, at]
         east, north = _frame(u, pole, pair)
         u = u + (off[:, :1] * np.cos(lat)[:, None]) * east + off[:, 1:] * north
         u /= np.linalg.norm(u, axis=1)[:, None]
@@ -161,7 +164,7 @@ def _horizon(problem: Problem, station: Station, t: Array) -> tuple[Array, tuple
     """Matrices (K, 3, 3) from the axes of the Earth to those of the problem, and east, north and up at the station."""
     recipe: Any = station.place
     epochs = [problem.epoch + float(v) for v in t]
-    longitude, latitude, _ = position_to_geodetic(recipe.station.position(epochs[:1])[0])
+    latitude, longitude, _ = position_to_geodetic(recipe.station.position(epochs[:1])[0])
     c, s, cl, sl = np.cos(longitude), np.sin(longitude), np.cos(latitude), np.sin(latitude)
     axes = np.array([-s, c, 0.0]), np.array([-sl * c, -sl * s, cl]), np.array([cl * c, cl * s, sl])
     return rotation("ITRF", "GCRF", epochs, recipe.eop), axes
