@@ -30,6 +30,13 @@ class Given(Bundle, parameters="P", manoeuvres="*", data="*"):
     """
 
 
+class Beside(Bundle, parameters="P", manoeuvres="*", data="*", sides="*", work="*"):
+    """What a model is told, with the side of each event that the orbit is on, 1 or -1, and work space.
+
+    The work space has values and rates of all events at the start of a step, at its end, and in between.
+    """
+
+
 class Measured(Bundle, z="J M", station="int64 J", sensor="int64 S", numbers="S U", R="S M M", correlated="int64 S"):
     """Rows of measurements and who made them; sensor, numbers, noise of each station, and whether that is correlated."""
 

@@ -8,6 +8,8 @@ the factors of an update.  The functions:
 * ``trial(t, h, x, p)``, ``orbit_axes(x)``: a step with its error; the directions of the orbit (see `steps`)
 * ``remember(x)``, ``first_rows()``: the state at the start of a step, and its derivative; ``identity_rows()``
 * ``complete(R)``: R with the constants' rows below it
+* ``dynamics_beside(t, x, p)``, ``rhs_beside(t, x, R, p)``: of a model with events, on the sides of them that `p` says
+* ``events_into(t, x, p, at)``, ``event_row(t, x, p, event)``, ``jumped(R, jump, row)``: see `_events_source`
 * ``measure_into(sensor, t, x, p, s, at, out, row)``: h
 * ``innovate(sensor, t, x, p, s, at, z, row, nu, H, out)``: z - h, angles wrapped and put on the sky, and H
 * ``measure_row(measured, row, t, x, p, out, at)``, ``innovate_row(measured, row, t, x, p, nu, H, out)``: of a row's station
@@ -24,14 +26,17 @@ from typing import TYPE_CHECKING, Any
 from piazzi.kernels.multistep import multistep_source
 from piazzi.kernels.outside import outside_source
 from piazzi.kernels.printer import function, in_time
+from piazzi.kernels.quadrature import rule_source
 from piazzi.kernels.steps import adaptive_source, axes_source, kepler_source, runge_kutta_source
 from piazzi.kernels.steps import inline_source as _inline
 from piazzi.kernels.tableaus import DORMAND_PRINCE_8
 from piazzi.model import Model, Sensor
-from piazzi.model.derivation import constant_acceleration_step, derive, derive_sensor
+from piazzi.model.derivation import constant_acceleration_step, derive, derive_events, derive_sensor
 
 if TYPE_CHECKING:
     import sympy as sp
+
+SIDE = "p.sides[{}]"  # of an event, where the integrator knows it
 
 
 def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
@@ -57,18 +62,29 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
     if not model.discrete:
         parts.append(_dynamics_source(model))
     parts.append(_step_source(model, scheme))
+    if model.events:
+        parts.append(_events_source(model))
     if model.looks_elsewhen:
         parts.append(re.sub(r"\bsubstep", "elsewhen", runge_kutta_source(*DORMAND_PRINCE_8, rule=False)))
     parts.append(_sensor_source(model))
     return "".join(parts)
 
 
-def _arguments(model: Model, extra: Sequence[str] = ()) -> tuple[list[str], dict[sp.Symbol, str], str]:
-    """Argument names, the symbols they stand for, and the call from the state `x` and what is given, `p`."""
+def _arguments(
+    model: Model, extra: Sequence[str] = (), beside: str = ""
+) -> tuple[list[str], dict[sp.Symbol, str], str]:
+    """Argument names, the symbols they stand for, and the call from the state `x` and what is given, `p`.
+
+    The equations of motion have the side of each event besides: `beside` says what is called for it, with its number for {}.
+    """
     d = derive(model)
     names = {s: f"x{i}" for i, s in enumerate(d.x)} | {s: f"p{i}" for i, s in enumerate(d.p)} | {d.t: "t"}
     arguments = ["t", *extra, *(f"x{i}" for i in range(len(d.x))), *(f"p{i}" for i in range(len(d.p)))]
     call = ", ".join(["t", *extra, *(f"x[{i}]" for i in range(len(d.x))), *(f"p.parameters[{i}]" for i in range(len(d.p)))])
+    if beside:
+        names |= {s: f"side{i}" for i, s in enumerate(d.sides)}
+        arguments += [f"side{i}" for i in range(len(d.sides))]
+        call += "".join(f", {beside.format(i)}" for i in range(len(d.sides)))
     return (["p", *arguments], names, f"p, {call}") if model.reads_data else (arguments, names, call)
 
 
@@ -141,21 +157,63 @@ def _unpack(names: Sequence[str], call: str) -> str:
 
 
 def _dynamics_source(model: Model) -> str:
-    d, (arguments, names, call) = derive(model), _arguments(model)
+    d, (arguments, names, call) = derive(model), _arguments(model, beside="0.0")
     nd, n, called = len(model.moving), model.n, _called(model)
     F = _Jacobian(d.F, "F", called)
     rates = [f"f{i}" for i in range(nd)]
     whole = f"alike(x, {', '.join(rates + ['0.0'] * (n - nd))})"
     rows = ", ".join(F.row_times(i, _rows(model), n) for i in range(nd))
+
+    def rates_by(suffix: str, call: str) -> str:
+        value, both = _unpack(rates, f"scalar_f({call})"), _unpack(rates + F.names, f"scalar_f_F({call})")
+        return _inline(f"dynamics{suffix}(t, x, p)", value, f"return {whole}") + _inline(
+            f"rhs{suffix}(t, x, R, p)", both, f"return {whole}, matrix({rows})"
+        )
+
     return (
         function("scalar_f", arguments, names, list(d.f), d.values, called)
         + function("scalar_f_F", arguments, names, list(d.f) + F.outputs, d.partials, called + F.called)
-        + _inline("dynamics(t, x, p)", _unpack(rates, f"scalar_f({call})"), f"return {whole}")
-        + _inline("rhs(t, x, R, p)", _unpack(rates + F.names, f"scalar_f_F({call})"), f"return {whole}, matrix({rows})")
+        + rates_by("", call)
+        + (rates_by("_beside", _arguments(model, beside=SIDE)[2]) if model.events else "")
     )
 
 
 def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
+    source = _any_step_source(model, scheme)
+    if model.events and scheme[0] != "kepler":
+        source = re.sub(r"\b(dynamics|rhs)\(", r"\1_beside(", source)
+        if "GAPS = " not in source:  # noise is integrated piece by piece
+            source = rule_source(6) + source
+        if scheme[0] == "adaptive":
+            source += _inline("substep(t, h, x, p)", "y, _ = trial(t, h, x, p)", "return y")
+    return source
+
+
+def _events_source(model: Model) -> str:
+    """Values of events with their rates along the orbit, their derivatives by the state, and what a jump makes of rows."""
+    d, (arguments, names, call) = derive_events(model), _arguments(model)
+    nd, n, count = len(model.moving), model.n, len(model.events)
+    called = [f"event {name}" for name, _ in model.events]
+    J = _Jacobian(d.G, "G", called)
+    values = [f"g{e}" for e in range(count)]
+    unpack = _unpack(values + J.names, f"scalar_g({call})")
+    into = [unpack, "f = dynamics_beside(t, x, p)", *(f"p.work[at + {e}] = g{e}" for e in range(count))]
+    row = [unpack, "row = unit(-1, N)"]
+    for e in range(count):
+        terms = [J.entry(e, n), *(f"{J.entry(e, i)}*f[{i}]" for i in range(nd) if J.entry(e, i))]
+        into.append(f"p.work[at + {count + e}] = {' + '.join(term for term in terms if term) or '0.0'}")
+        entries = ", ".join(J.entry(e, i) or "0.0" for i in range(n))
+        row += [f"if event == {e}:", f"    row = vector({entries})"]
+    return (
+        f"EVENTS = {count}\nEVENTS_WORK = {6 * count}\n\n\n"
+        + function("scalar_g", arguments, names, list(d.g) + J.outputs, d.partials, called + J.called)
+        + _inline("events_into(t, x, p, at)", *into, "return f", mark="outlined")
+        + _inline("event_row(t, x, p, event)", *row, "return row", mark="outlined")
+        + _inline("jumped(R, jump, row)", f"return matrix({', '.join(f'R[{i}] + jump[{i}]*row' for i in range(nd))})")
+    )
+
+
+def _any_step_source(model: Model, scheme: tuple[Any, ...]) -> str:
     if scheme[0] == "runge-kutta":
         return runge_kutta_source(*scheme[1])
     if scheme[0] == "gauss-jackson":
@@ -172,7 +230,7 @@ def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
 def _constant_acceleration_source(model: Model) -> str:
     """The step of the founding text; its derivative needs F of the rates alone, so it costs no more than they do."""
     d, (nxt, h) = derive(model), constant_acceleration_step(model)
-    arguments, names, call = _arguments(model, ("h",))
+    arguments, names, call = _arguments(model, ("h",), SIDE)
     names = {**names, h: "h"}
     nd, n, called = len(model.moving), model.n, _called(model)
     F, rows = _Jacobian(d.F, "F", called), _rows(model)

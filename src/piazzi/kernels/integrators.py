@@ -174,7 +174,7 @@ class DormandPrince(Integrator):
 
     @property
     def fragments(self) -> tuple[str, ...]:
-        return ("arc_adaptive",)
+        return ("adaptive_control", "arc_adaptive")
 
     @property
     def noise_fragments(self) -> tuple[str, ...]:

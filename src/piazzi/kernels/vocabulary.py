@@ -11,6 +11,7 @@ from piazzi.kernels.bundle import (  # noqa: F401
     Accuracy,
     Belief,
     Beliefs,
+    Beside,
     Border,
     Chain,
     Drawn,
@@ -64,6 +65,8 @@ DRIVEN: int
 SLOT: int
 TOP: int
 HISTORY: int
+EVENTS: int
+EVENTS_WORK: int
 
 
 # functions of the language, as far as fragments use them
@@ -94,6 +97,10 @@ doubled: Any
 doubled_of: Any
 joined: Any
 joined_of: Any
+dynamics_beside: Any
+events_into: Any
+event_row: Any
+jumped: Any
 first_rows: Any
 identity_rows: Any
 remember: Any
@@ -109,6 +116,10 @@ propagate_arc: Any
 propagate_arc_jacobian: Any
 propagate_arc_noise: Any
 propagate_noise: Any
+begin: Any
+crossing: Any
+cross: Any
+arrive: Any
 combined_error: Any
 matrix_error: Any
 noise_in_axes: Any

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from piazzi.expressions import symbol, to_sympy
 from piazzi.model.definitions import Definition, needed
+from piazzi.model.events import on_side
 from piazzi.model.functions import AT, ROOT, STATION, STATION_TABLE, Signature
 from piazzi.model.jacobian import jacobian
 from piazzi.model.sensor import Parameter, Sensor
@@ -33,6 +34,8 @@ class Equations(Protocol):
     @property
     def functions(self) -> Any: ...
     @property
+    def events(self) -> Any: ...
+    @property
     def slots(self) -> Mapping[str, int]: ...
     @property
     def discrete(self) -> bool: ...
@@ -46,11 +49,17 @@ class Equations(Protocol):
 class Chain:
     """Definitions as symbols, each with its derivatives by the values `x`, which are symbols too.
 
-    `x` are the estimated values, and within a root its unknown besides.
+    `x` are the estimated values, and within a root its unknown besides; `sides` are those of events, by name.
     """
 
-    def __init__(self, model: Equations, symbols: dict[str, sp.Symbol], x: Sequence[sp.Symbol]) -> None:
-        self.model, self.symbols, self.x = model, symbols, tuple(x)
+    def __init__(
+        self,
+        model: Equations,
+        symbols: dict[str, sp.Symbol],
+        x: Sequence[sp.Symbol],
+        sides: Mapping[str, sp.Symbol] | None = None,
+    ) -> None:
+        self.model, self.symbols, self.x, self.sides = model, symbols, tuple(x), sides or {}
         self.values: list[AnyStage] = []
         self.partials: list[AnyStage] = []
         self._by_x: dict[sp.Symbol, dict[int, sp.Expr]] = {}  # definition -> number of the value -> derivative, or its symbol
@@ -69,6 +78,8 @@ class Chain:
                 self._call(d)
             else:
                 self._value(d.names[0], to_sympy(d.texts[0], self.symbols))
+            for name in self.sides.keys() & set(d.provides):
+                self._take_side(name)
 
     def define_dynamics(self) -> None:
         """Add the definitions that the dynamics need and that are not there yet."""
@@ -90,6 +101,14 @@ class Chain:
         new = self._new(name)
         slopes = {j: row[0, j] for j in range(len(self.x)) if row[0, j] != 0}
         self._known(new, value, slopes)
+
+    def _take_side(self, name: str) -> None:
+        """Put an event on its side for all that use it by name; its derivatives stay."""
+        value, new = self.symbols[name], self._new(name)
+        stage = Stage((new,), (on_side(value, self.sides[name]),))
+        self.values.append(stage)
+        self.partials.append(stage)
+        self._by_x[new] = self._by_x.get(value, {})
 
     def _known(self, new: sp.Symbol, value: sp.Expr, slopes: Mapping[int, sp.Expr]) -> None:
         """A stage of a value and its derivatives."""

@@ -25,6 +25,7 @@ class Derivation:
     x : estimated values (n), p : given parameters, t : time, dt : step (of a discrete model)
     f : matrix (states, 1); F : df/dx, matrix (states, n)
     values, partials : what has to be worked out before f, and before f and F, in this order
+    sides : for each event, the side of it that the equations are on
     """
 
     x: tuple[sp.Symbol, ...]
@@ -35,6 +36,16 @@ class Derivation:
     F: sp.Matrix
     values: tuple[AnyStage, ...] = ()
     partials: tuple[AnyStage, ...] = ()
+    sides: tuple[sp.Symbol, ...] = ()
+
+
+@dataclass(frozen=True)
+class EventDerivation:
+    """Values g (E, 1) of events, their derivatives G (E, n + 1) by the estimated values and by time, and what comes before."""
+
+    g: sp.Matrix
+    G: sp.Matrix
+    partials: tuple[AnyStage, ...]
 
 
 @dataclass(frozen=True)
@@ -49,19 +60,37 @@ class SensorDerivation:
 
 
 @lru_cache(maxsize=64)
-def derive(model: Equations) -> Derivation:
-    """Dynamics and their Jacobian; raises ExpressionError for an equation outside the language."""
+def derive(model: Equations, beside: bool = True) -> Derivation:
+    """Dynamics and their Jacobian; raises ExpressionError for an equation outside the language.
+
+    They are those of one side of each event, unless not `beside`: then events are definitions like others.
+    """
     import sympy as sp
 
     symbols = {name: symbol(name) for name in (*model.names, *model.given, TIME, STEP)}
     x = tuple(symbols[name] for name in model.names)
-    chain = Chain(model, symbols, x)
+    sides = {name: sp.Dummy(f"side_{name}", real=True) for _, name in model.events if beside}
+    chain = Chain(model, symbols, x, sides)
     chain.define(model.definitions, needed(model.dynamics, model.definitions))
     remembered = [symbols[name] if model.discrete else sp.Integer(0) for name, _ in model.memory]
     f = sp.Matrix([*(to_sympy(e, symbols) for e in model.dynamics), *remembered])
     p = tuple(symbols[name] for name in model.given)
     F = chain.derivative(f)
-    return Derivation(x, p, symbols[TIME], symbols[STEP], f, F, tuple(chain.values), tuple(chain.partials))
+    before = tuple(chain.values), tuple(chain.partials)
+    return Derivation(x, p, symbols[TIME], symbols[STEP], f, F, *before, tuple(sides.values()))
+
+
+@lru_cache(maxsize=64)
+def derive_events(model: Equations) -> EventDerivation:
+    """The events of a model and their derivatives; that by time is a partial one."""
+    import sympy as sp
+
+    symbols = {name: symbol(name) for name in (*model.names, *model.given, TIME)}
+    chain = Chain(model, symbols, [symbols[name] for name in (*model.names, TIME)])
+    names = [name for _, name in model.events]
+    chain.define(model.definitions, needed(names, model.definitions))
+    g = sp.Matrix([symbols[name] for name in names])
+    return EventDerivation(g, chain.derivative(g), tuple(chain.partials))
 
 
 @lru_cache(maxsize=256)

@@ -8,7 +8,7 @@ from typing import Any
 from piazzi.expressions import names, symbol, to_sympy
 from piazzi.model.chain import Equations
 from piazzi.model.definitions import Definition
-from piazzi.model.derivation import derive, derive_sensor
+from piazzi.model.derivation import derive, derive_events, derive_sensor
 from piazzi.model.functions import AT, ROOT, STATION_TABLE
 from piazzi.model.stages import AnyStage, Call, Stage
 
@@ -19,12 +19,12 @@ Line = tuple[str, Any]  # what a value is called, and what it is
 def sections(model: Equations) -> list[tuple[str, Any]]:
     """Titles and what is under them, lines or SymPy objects.
 
-    State, parameters, functions from outside, definitions and their derivatives, dynamics and F, then of every sensor the same
+    State, parameters, functions from outside, definitions and their derivatives, dynamics and F, events, then of every sensor the same
     and h and H.  Derivatives are symbols in those that use them, as definitions are: see `plain`.
     """
     import sympy as sp
 
-    d = derive(model)
+    d = derive(model, beside=False)
     name_of_f = "x[k+1]" if model.discrete else "dx/dt = f"
     out: list[tuple[str, Any]] = [("state x", sp.Matrix(d.x))]
     if model.parameters:
@@ -34,6 +34,10 @@ def sections(model: Equations) -> list[tuple[str, Any]]:
     seen: set[str] = set()
     out += _defined("definitions", model.definitions, d.partials, seen)
     out += [(name_of_f, plain(d.f)), ("Phi = dx[k+1]/dx" if model.discrete else "F = df/dx", plain(d.F))]
+    if model.events:
+        e = derive_events(model)
+        out += _defined("events", (), e.partials, seen)
+        out += [(f"events g: {', '.join(name for name, _ in model.events)}", plain(e.g)), ("dg/d(x, t)", plain(e.G))]
     for sensor in model.sensors:
         s = derive_sensor(model, sensor)
         own = [symbol for symbol in s.own if symbol.name != STATION_TABLE]

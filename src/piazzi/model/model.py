@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from piazzi.expressions import FUNCTIONS, names
 from piazzi.model.definitions import STEP, TIME, Definition, Hoist, definitions_of, in_order, name_of, needed, unused
+from piazzi.model.events import check_events, events_of
 from piazzi.model.functions import AT, ROOT, STATION, Signature, signature_of
 from piazzi.model.sensor import Parameter, Sensor, as_tuple
 from piazzi.text import nearest, suggest
@@ -36,6 +37,9 @@ class Model:
         Values that dynamics, sensors and other definitions use by name, in any order.  Each is worked out once, and derived by
         the chain rule; nothing is substituted.  Several names take the values of one function: ``{"gx, gy, gz": "field(x, y,
         z)"}``, or a tuple of names; they may be fewer than the function has.
+    events : mapping of name to definition, such as ``{"shadow": "edge"}``, or names of definitions
+        Where one of these passes through zero, a step of the integrator ends.  Where the dynamics jump with it (`sign(edge)`),
+        the transition matrix has the term of the jump.
     functions : mapping of name to function, or to its signature
         Functions from outside that the equations may call, such as ``earth.Gravity(...)``; their data belong to the `Problem`.
     roots : mapping of name to a table of ``root``, ``start``, ``iterations`` and ``definitions``
@@ -58,6 +62,7 @@ class Model:
     definitions: Any = field(default_factory=dict)
     functions: Any = ()
     roots: Any = ()
+    events: Any = ()
 
     if TYPE_CHECKING:  # what is taken; the fields above say what is kept of it
 
@@ -74,6 +79,7 @@ class Model:
             definitions: Mapping[Any, Any] | Sequence[Any] = (),
             functions: Mapping[str, Any] | Sequence[tuple[str, Any]] = (),
             roots: Mapping[str, Mapping[str, Any]] | Sequence[Any] = (),
+            events: Mapping[str, str] | Sequence[Any] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -85,6 +91,7 @@ class Model:
         put(self, "memory", remembered)
         functions = dict(self.functions).items()
         put(self, "functions", tuple((name_of(k, "function"), signature_of(v, str(k))) for k, v in functions))
+        put(self, "events", events_of(self.events))
         hoist = Hoist([name for name, _ in self.functions])
         given = definitions_of(self.definitions, "definitions", hoist, self.roots)
         put(self, "dynamics", self._equations(hoist))
@@ -93,6 +100,7 @@ class Model:
         put(self, "groups", tuple((str(g), tuple(str(s) for s in members)) for g, members in dict(self.groups).items()))
         put(self, "units", tuple((str(s), str(u)) for s, u in dict(self.units).items()))
         self._check_names()
+        check_events(self)
         self._check_equations()
 
     def _sensors(self) -> tuple[Sensor, ...]:
@@ -164,6 +172,7 @@ class Model:
             if STEP in needed(sensor.free_names, self.definitions):
                 raise ValueError(f"sensor {sensor.name!r} uses {STEP!r}, the length of a step, which no measurement has")
         users = (*self.dynamics, *(name for sensor in self.sensors for name in sorted(sensor.free_names)))
+        users = (*users, *(name for _, name in self.events))
         for name in unused(self.definitions, users):
             raise ValueError(f"definition {name!r} is used by no equation")
         self._check_calls()

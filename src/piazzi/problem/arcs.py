@@ -12,6 +12,7 @@ from piazzi.kernels.bundle import Given
 from piazzi.kernels.outside import outside_fragments
 from piazzi.model import Model
 from piazzi.problem.checks import Array
+from piazzi.problem.evaluation import cut_at_events
 from piazzi.problem.manoeuvres import SAME
 
 FEWEST = 30  # steps between two beginnings of a multi-step method: with fewer, its beginning costs what it saves
@@ -133,7 +134,8 @@ def _by_intervals(problem: Moving, times: Array, out: Arc, steps: Steps, events:
     if events:
         library = kernels.load(problem.spec("transition", name))
     else:
-        library = kernels.load(_spec(problem, integrator.scheme, ("matrices", *integrator.fragments, "transition", name)))
+        motion = cut_at_events(problem.model, integrator.fragments)
+        library = kernels.load(_spec(problem, integrator.scheme, ("matrices", *motion, "transition", name)))
     if name == "transitions":
         library.run_transitions(len(times), times, count, given, out.x, out.Phi)
     else:

@@ -134,22 +134,44 @@ def check_own_functions(
                 own[call.function].check(call.function, *arguments)
 
 
+CUT = {  # fragments of integrators whose steps end at the events of a model
+    "arc_steps": ("events", "arc_steps_events"),
+    "arc_adaptive": ("events", "arc_adaptive_events"),
+    "noise_integral": ("noise_lobatto", "noise_steps_events"),
+    "noise_steps": ("noise_steps_events",),
+    "noise_adaptive": ("noise_adaptive_events",),
+}
+
+
+def cut_at_events(model: Model, fragments: Iterable[str]) -> tuple[str, ...]:
+    """The fragments of an integrator; of a model with events those that look for them."""
+    return tuple(part for name in fragments for part in (CUT.get(name, (name,)) if model.events else (name,)))
+
+
 def fragments_of(
-    fragments: tuple[str, ...], integrator: Integrator, *, manoeuvres: bool, axes: str, noise_varies: bool, in_lanes: bool
+    model: Model,
+    fragments: tuple[str, ...],
+    integrator: Integrator,
+    *,
+    manoeuvres: bool,
+    axes: str,
+    noise_varies: bool,
+    in_lanes: bool,
 ) -> tuple[str, ...]:
     """The fragments by the names of their files, in order; `axes` of the process noise, `in_lanes` if states move together.
 
-    "transition" becomes the motion of the integrator and the events on the way; "noise_scaled" and "noise_integral" become the
-    axes of the noise, its integration and the same events; "linearize_scaled" is replaced where states cannot be worked on
+    "transition" becomes the motion of the integrator and what happens on the way; "noise_scaled" and "noise_integral" become
+    the axes of the noise, its integration and the same; "linearize_scaled" is replaced where states cannot be worked on
     together; that and "chain_noise_scaled" where the noise is not a multiple of one matrix.
     """
     events = "_manoeuvres" if manoeuvres else ""
+    moved, noisy = cut_at_events(model, integrator.fragments), cut_at_events(model, integrator.noise_fragments)
     turned = "axes_orbit" if axes == "orbit" else "axes"
     linearize = "linearize_integral" if noise_varies else "linearize_scaled" if in_lanes else "linearize_each"
     parts = {
-        "transition": ("matrices", *integrator.fragments, f"transition{events}"),
+        "transition": ("matrices", *moved, f"transition{events}"),
         "noise_scaled": (turned, "noise_scaled", f"advance{events}"),
-        "noise_integral": (turned, *integrator.noise_fragments, f"advance{events}"),
+        "noise_integral": (turned, *noisy, f"advance{events}"),
         "linearize_scaled": (linearize,),
         "chain_noise_scaled": (f"chain_noise_{'integral' if noise_varies else 'scaled'}",),
     }

@@ -235,6 +235,7 @@ class Problem:
         spec = self.specs.get(key)
         if spec is None:
             parts = outside_fragments(self.model) + evaluation.fragments_of(
+                self.model,
                 fragments,
                 self.integrator,
                 manoeuvres=bool(self.manoeuvres),
@@ -284,7 +285,7 @@ class Problem:
     def moves_in_lanes(self) -> bool:
         """Whether several of its states can be carried over an interval together: the same operations for each of them."""
         assert self.integrator is not None
-        return self.integrator.in_lanes and not self.manoeuvres
+        return self.integrator.in_lanes and not self.manoeuvres and not self.model.events
 
     @property
     def runs_in_ensemble(self) -> bool:

@@ -48,6 +48,7 @@ class Physics:
     functions: dict[str, Any] = field(default_factory=dict)
     forces: ForceChoice | None = None
     dynamics: dict[str, str] = field(default_factory=dict)
+    events: dict[str, str] = field(default_factory=dict)
     defaults: dict[str, dict[str, float]] = field(default_factory=dict)
     schedules: dict[str, Schedule | None] = field(default_factory=dict)
 
@@ -97,6 +98,7 @@ def read_physics(file: Table, units: Units, epoch: Epoch | None = None, forces: 
     known, solved = {*out.known, *([STEP] if "step" in file else [])}, file.table("roots")
     out.definitions = read_definitions(file.table("definitions"), {*known, *_provided(solved.data)}, out)
     out.roots = _roots(solved, {*known, *out.known, *_provided(solved.data)}, out, out.functions)
+    out.events = _events(file.table("events"))
     out.dynamics = _dynamics(file, out)
     sensors = [_sensor(name, table, units, out, epoch) for name, table in file.table("sensors").tables()]
     out.groups = _groups(file, out)
@@ -111,12 +113,13 @@ def _model(out: Physics, parameters: list[Parameter], sensors: list[Sensor], lab
     dynamics, definitions, functions = out.dynamics, out.definitions, dict(out.functions)
     if out.forces is not None:
         dynamics = dynamics_of(out.forces, dynamics)
-        seen = [name for sensor in sensors for name in sensor.free_names]
+        seen = [*(name for sensor in sensors for name in sensor.free_names), *out.events.values()]
         texts = [*dynamics.values(), *definitions.values(), *_texts(out.roots), *seen]
         definitions = definitions_of(out.forces, definitions, texts)
     equations = [dynamics[s] for s in out.states]
+    own = out.memory, definitions, functions, out.roots, out.events
     return Model(
-        out.states, equations, sensors, parameters, out.groups, labels, discrete, out.memory, definitions, functions, out.roots
+        out.states, equations, sensors, parameters, out.groups, labels, discrete, *own
     )  # fmt: skip
 
 
@@ -248,6 +251,11 @@ def read_definitions(
                 table.fault(key, "is also a state or a parameter: every name has one meaning")
     allowed = {*known, *_names(table.data)}
     return {key: equation(table, key, allowed, hint, out.functions if outside is None else outside) for key in table.data}
+
+
+def _events(table: Table) -> dict[str, str]:
+    """Names of events, each with the definition whose zero it is."""
+    return {name: text for name in table.data if (text := table.text(name)) is not None}
 
 
 def _roots(table: Table, known: Collection[str], out: Physics, outside: Collection[str]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from piazzi.scenarios.table import Faults, ScenarioError, Table
 from piazzi.units import Labels
 
 SECTIONS = (
-    "states", "memory", "groups", "functions", "dynamics", "step", "parameters", "sensors", "stations", "prior",
+    "states", "memory", "groups", "functions", "events", "dynamics", "step", "parameters", "sensors", "stations", "prior",
     "process_noise", "integrator", "manoeuvres", "truth", "epoch",
 )  # fmt: skip
 
@@ -75,6 +75,7 @@ def _equations(model: Model) -> dict[str, Any]:
         "groups": {g: list(members) for g, members in model.groups},
         "definitions": _values(model.definitions),
         "roots": {d.names[0]: _root(d) for d in model.definitions if d.function == ROOT},
+        **({"events": dict(model.events)} if model.events else {}),
         "step" if model.discrete else "dynamics": dict(zip(model.states, model.dynamics, strict=True)),
         "sensors": {s.name: _sensor(model, s) for s in model.sensors},
     }

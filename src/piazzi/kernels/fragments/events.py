@@ -1,0 +1,144 @@
+"""Where an orbit passes an event: a step is cut there, and the equations of motion go over to its other side.
+
+Up to there every stage of the step sees the side that it began on, so that the step is smooth.  Where the rates jump from f- to
+f+, a displacement that reaches the event earlier has f+ in the place of f- for so much longer: the transition matrix has the
+factor I + (f+ - f-) (dg/dx) / (dg/dt), dg/dt along the orbit before the event.  `p` is the bundle `Beside`.
+"""
+
+from piazzi.kernels.vocabulary import *  # noqa: F403
+
+
+@inline
+def begin(t, dt, x, own):
+    """The sides on which an orbit begins; on an event, that on which it goes on.
+
+    Times that differ by 1e-12 of themselves, or by as many seconds, are one, as for manoeuvres: so a crossing at an epoch is
+    counted once, in the interval that ends there.
+    """
+    for e in range(EVENTS):
+        own.sides[e] = 0.0
+    events_into(t, x, own, 0)
+    for e in range(EVENTS):
+        own.sides[e] = side_of(own.work[e])
+    events_into(t, x, own, 0)
+    for e in range(EVENTS):
+        if fabs(own.work[e]) <= 1e-12 * maximum(fabs(t), 1.0) * fabs(own.work[EVENTS + e]):
+            own.sides[e] = side_of(own.work[EVENTS + e] * dt)
+            own.work[e] = 0.0
+
+
+@inline
+def side_of(g):
+    """1 or -1, 0 at zero."""
+    return 1.0 if g > 0.0 else -1.0 if g < 0.0 else 0.0
+
+
+@inline
+def lowest(a, b, c, d):
+    """Where in (0, 1), and how low, the cubic with values a and c and slopes b < 0 and d > 0 at the ends is least."""
+    second = 3.0 * (c - a) - 2.0 * b - d
+    third = 2.0 * (a - c) + b + d
+    s = -b / (second + sqrt(maximum(second * second - 3.0 * third * b, 1e-300)))
+    return s, a + s * (b + s * (second + s * third))
+
+
+@outlined
+def passes(e, t, h, x, p):
+    """A fraction of the step at which the orbit is beyond event e, 2 where it never is.
+
+    It is beyond at the end, or at a least distance in between, which is looked for through the values and rates at both ends.
+    """
+    side, first, last, middle = p.sides[e], e, 2 * EVENTS + e, 4 * EVENTS + e
+    a, b = side * p.work[first], side * h * p.work[first + EVENTS]
+    c, d = side * p.work[last], side * h * p.work[last + EVENTS]
+    slack = 1e-12 * maximum(fabs(t + h), 1.0) / fabs(h)
+    if side == 0.0:
+        return 2.0
+    if c <= -slack * d:  # also on the edge, about to leave
+        return 1.0
+    low, high = 0.0, 1.0
+    rounding = 1e-14 * maximum(a, c)
+    for _ in range(6):
+        if not b < 0.0 < d:
+            return 2.0
+        width = high - low
+        s, least = lowest(a, width * b, c, width * d)
+        if least > minimum(a, c) - least:
+            return 2.0
+        s = low + width * s
+        events_into(t + s * h, substep(t, s * h, x, p), p, 4 * EVENTS)
+        value, rate = side * p.work[middle], side * h * p.work[middle + EVENTS]
+        if value <= -rounding:  # else it touches
+            return s
+        if rate < 0.0:
+            low, a, b = s, value, rate
+        else:
+            high, c, d = s, value, rate
+    return 2.0
+
+
+@outlined
+def located(e, t, h, x, p, high):
+    """The fraction of the step at which the orbit passes event e, before the one at which it is beyond: by Newton's method."""
+    side, last = p.sides[e], (2 if high == 1.0 else 4) * EVENTS + e
+    a, b = side * p.work[e], side * h * high * p.work[e + EVENTS]
+    c, d = side * p.work[last], side * h * high * p.work[last + EVENTS]
+    if c > 0.0:  # as good as there
+        return high
+    second, third = 3.0 * (c - a) - 2.0 * b - d, 2.0 * (a - c) + b + d
+    low, top = 0.0, 1.0
+    for _ in range(30):  # of the cubic through values and rates at both ends
+        s = 0.5 * (low + top)
+        if a + s * (b + s * (second + s * third)) > 0.0:
+            low = s
+        else:
+            top = s
+    s, low = high * 0.5 * (low + top), 0.0
+    for _ in range(60):
+        events_into(t + s * h, substep(t, s * h, x, p), p, 4 * EVENTS)
+        value, rate = side * p.work[4 * EVENTS + e], side * h * p.work[5 * EVENTS + e]
+        if value > 0.0:
+            low = s
+        else:
+            high = s
+        step = value / rate if rate < 0.0 else inf
+        after = s - step if low <= s - step <= high else 0.5 * (low + high)
+        if fabs(after - s) <= 1e-12:
+            return after
+        s = after
+    return s
+
+
+@outlined
+def crossing(t, h, x, y, p):
+    """The first event on the way from x to y, -1 where there is none, and at which fraction of the step."""
+    events_into(t + h, y, p, 2 * EVENTS)
+    event, first = -1, 2.0
+    for e in range(EVENTS):
+        s = passes(e, t, h, x, p)
+        if s <= 1.0:
+            s = located(e, t, h, x, p, s)
+            if s < first:
+                event, first = e, s
+    return event, first
+
+
+@inline
+def arrive(p):
+    """The end of a step becomes the start of the next."""
+    for e in range(EVENTS):
+        p.work[e] = p.work[2 * EVENTS + e]
+        p.work[EVENTS + e] = p.work[3 * EVENTS + e]
+        if p.sides[e] == 0.0:
+            p.sides[e] = side_of(p.work[e])
+
+
+@outlined
+def cross(t, x, e, p):
+    """Go over to the other side of event e: what the rates jump by, over the rate of the event, and its derivative by x."""
+    before = events_into(t, x, p, 0)
+    rate = p.work[EVENTS + e]
+    p.sides[e] = -p.sides[e]
+    after = events_into(t, x, p, 0)
+    p.work[e] = 0.0
+    return (1.0 / rate if fabs(rate) > 0.0 else 0.0) * (after - before), event_row(t, x, p, e)
