@@ -121,5 +121,5 @@ def test_a_scenario_with_a_wrong_event_is_refused_with_its_place(tmp_path, wrong
 def test_the_program_ends_with_2(tmp_path, capsys):
     path = tmp_path / "walls.toml"
     path.write_text(SCENARIO.replace('wall = "edge"', 'wall = "egde"'))
-    assert main(["scenario", "check", str(path)]) == 2
+    assert main(["scenarios", "check", str(path)]) == 2
     assert "event 'wall' names 'egde'" in "".join(capsys.readouterr())

@@ -70,9 +70,7 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
     return "".join(parts)
 
 
-def _arguments(
-    model: Model, extra: Sequence[str] = (), beside: str = ""
-) -> tuple[list[str], dict[sp.Symbol, str], str]:
+def _arguments(model: Model, extra: Sequence[str] = (), beside: str = "") -> tuple[list[str], dict[sp.Symbol, str], str]:
     """Argument names, the symbols they stand for, and the call from the state `x` and what is given, `p`.
 
     The equations of motion have the side of each event besides: `beside` says what is called for it, with its number for {}.

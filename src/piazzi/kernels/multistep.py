@@ -79,7 +79,7 @@ def _lagrange(j: int, count: int) -> Weights:
 
 def second_order(model: Model) -> tuple[tuple[int, int], ...]:
     """Pairs of a state whose rate is a state, and that state, by position; () unless every other state is constant."""
-    if model.discrete or model.memory:
+    if model.discrete or model.memory or model.events:
         return ()
     place = {name: i for i, name in enumerate(model.states)}
     rates = [text.strip() for text in model.dynamics]
