@@ -19,8 +19,8 @@ Line = tuple[str, Any]  # what a value is called, and what it is
 def sections(model: Equations) -> list[tuple[str, Any]]:
     """Titles and what is under them, lines or SymPy objects.
 
-    State, parameters, functions from outside, definitions and their derivatives, dynamics and F, events, then of every sensor the same
-    and h and H.  Derivatives are symbols in those that use them, as definitions are: see `plain`.
+    State, parameters, functions from outside, definitions and their derivatives, dynamics and F, events, then of every sensor
+    the same and h and H.  Derivatives are symbols in those that use them, as definitions are: see `plain`.
     """
     import sympy as sp
 

@@ -41,8 +41,8 @@ _LONG_KEY = re.compile(rb"(?:[\w\"'-]{1,200}[ \t]{0,20}\.[ \t]{0,20}){30}")
 _PLACE = re.compile(r" \(at (line \d+, column \d+|end of document)\)$")
 SECTIONS = (
     "title", "epoch", "units", "earth", "states", "memory", "groups", "functions", "definitions", "roots", "events",
-    "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise", "gauss_markov", "integrator", "manoeuvres",
-    "times", "truth", "picture", "study", "recording",
+    "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise", "gauss_markov", "integrator",
+    "manoeuvres", "times", "truth", "picture", "study", "recording",
 )  # fmt: skip
 MAX_STEPS = 10**10
 MAX_ROWS = 2 * 10**7
