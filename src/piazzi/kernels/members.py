@@ -83,23 +83,32 @@ class Bundle:
         ValueError
             For arrays whose sizes contradict each other.
         """
-        if positional or members.keys() != self.slots.keys():
+        try:
+            found: list[Any] = [members[name] for name in self.slots]
+        except KeyError:
+            found = []
+        if positional or len(members) != len(found):
             wanted, given = set(self.slots), set(members)
             lacking, foreign = ", ".join(sorted(wanted - given)), ", ".join(sorted(given - wanted))
             name = type(self).__name__
             raise TypeError(f"{name} is made by names; missing: {lacking or 'none'}; unknown: {foreign or 'none'}")
-        found: list[Any] = [members[name] for name in self.slots]
         shapes: list[Any] = []
-        for value, wanted_type in zip(found, self._types, strict=True):
+        values: list[Any] = []
+        for value, wanted_type in zip(found, self._types, strict=True):  # one loop, because it runs in most calls
             if type(wanted_type) is str:
                 shapes.append(value if wanted_type else type(value))
+                values.append(value)
             elif type(value) is np.ndarray and value.dtype is wanted_type and value.flags.c_contiguous:
                 shapes.append(value.shape)
+                values.append(address(value))
         try:
             kind = self._kinds.get(tuple(shapes)) if len(shapes) == len(found) else None
         except TypeError:  # an array where a number should be
             kind = None
-        self._keep(found, self._check(members, tuple(shapes)) if kind is None else kind)
+        if kind is None:
+            kind = self._check(members, tuple(shapes))
+            values = [m if type(t) is str else address(m) for m, t in zip(found, self._types, strict=True)]
+        self.members, self.values, self.kind = tuple(found), values, kind
 
     def _check(self, members: Mapping[str, Any], shapes: tuple[Any, ...]) -> Kind:
         """The kind of a bundle of these members, which is remembered by their shapes."""
@@ -116,10 +125,6 @@ class Bundle:
         key = frozenset(sizes.items())
         found = cls._known.get(key)
         return remember(cls._known, key, Kind(cls, sizes)) if found is None else found
-
-    def _keep(self, members: list[Any], kind: Kind) -> None:
-        self.members, self.kind = tuple(members), kind
-        self.values = [m if type(t) is str else address(m) for m, t in zip(members, self._types, strict=True)]
 
     @classmethod
     def empty(cls, **sizes: int) -> Any:

@@ -94,8 +94,8 @@ class Problem:
             check_two_body(self.model, self.integrator, self._values())
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the specifications of kernels, which this process shares, and without blocks of data."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("specs", "_told")}
+        """Without the specifications of kernels, which this process shares, and without bundles, which have addresses."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("specs", "_told", "prior_bundle")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Nothing can be written into a copy either; the truth is the user's own, as it was given."""
@@ -172,7 +172,7 @@ class Problem:
         places = {f"station {s.name}": s.place for s in self.stations if s.place is not None}
         return {name: recipe.checksum for name, recipe in {**self.functions, **places}.items()}
 
-    @property
+    @cached_property
     def prior_bundle(self) -> Belief:
         """The prior of everything estimated, for kernels, which do not write to it."""
         return Belief(mean=self.mean, covariance=self.covariance)
