@@ -21,8 +21,8 @@ from piazzi.problem.epochs import epoch_given
 from piazzi.problem.gaps import is_restricted
 from piazzi.problem.truth import true_problem
 from piazzi.scenarios.earth import read_earth, with_forces
-from piazzi.scenarios.equations import read_physics
 from piazzi.scenarios.motion import read_gauss_markov, read_integrator, read_manoeuvres
+from piazzi.scenarios.physics import read_physics
 from piazzi.scenarios.scenario import Picture, Scenario, read_plan, read_recording, read_times
 from piazzi.scenarios.table import Fault, Faults, ScenarioError, Table, shown
 from piazzi.scenarios.truth import read_truth

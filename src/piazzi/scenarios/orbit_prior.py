@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.problem.checks import Array
-from piazzi.scenarios.equations import Physics, quantity
+from piazzi.scenarios.equations import Physics
+from piazzi.scenarios.quantities import quantity
 from piazzi.scenarios.table import Table
 from piazzi.units import Units
 

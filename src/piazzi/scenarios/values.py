@@ -11,9 +11,10 @@ from piazzi.model import Model
 from piazzi.problem import Gaussian, ProcessNoise, Station
 from piazzi.problem.checks import Array, covariance
 from piazzi.problem.constants import constant_name
-from piazzi.scenarios.equations import Physics, read_schedule
+from piazzi.scenarios.equations import Physics
 from piazzi.scenarios.orbit_prior import AXES, names_orbit, read_orbit, to_states
 from piazzi.scenarios.orbit_prior import STATES as ORBIT
+from piazzi.scenarios.quantities import read_schedule
 from piazzi.scenarios.table import Table, shown
 from piazzi.units import ONE, Units, is_quantity, size_of
 
