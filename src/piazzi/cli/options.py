@@ -17,24 +17,31 @@ import click
 F = TypeVar("F", bound=Callable[..., Any])
 source = click.argument("source", metavar="SOURCE")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, and nothing else there.")
-scenario = click.option("--scenario", metavar="NAME", help="Scenario that defines the problem for CSV input.")
+scenario = click.option("--scenario", metavar="NAME", help="Scenario that defines the problem, for CSV and tracking files.")
 SCALES = ("UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1")
 STREAM = "-"
+STATIONS = "Stations of tracking: SINEX, TOML, ilrs or mpc; may be repeated."
 
 
 def recording(function: F) -> F:
-    """Options --scale and --columns, of CSV input, as one argument `recording`."""
+    """Options of recordings and files of tracking, as one argument `recording`."""
 
     @wraps(function)
     def command(*args: Any, scale: str | None, columns: str | None, **rest: Any) -> Any:
         from piazzi.io.naming import parse_columns
         from piazzi.scenarios import Recording
 
-        return function(*args, recording=Recording(parse_columns(columns or ""), scale), **rest)
+        tracked = [rest.pop(name) for name in ("chosen", "sigma", "stations")]
+        return function(*args, recording=Recording(parse_columns(columns or ""), scale, *tracked), **rest)
 
     scales = click.Choice(SCALES, case_sensitive=False)
     said = f"Time scale of dates in CSV input that name none: {', '.join(SCALES)}."
     text = "Names of the columns of CSV input by ours, such as 'range=RNG[km] week=gps_week sow=gps_tow'."
+    command = click.option("--stations", multiple=True, metavar="FILE", help=STATIONS)(command)
+    command = click.option("--sigma", multiple=True, metavar="SIGMA", help="Of tracking: 10m, range=10m; may be repeated.")(
+        command
+    )
+    command = click.option("--object", "chosen", metavar="NAME", help="Object in tracking of several.")(command)
     command = click.option("--scale", metavar="SCALE", type=scales, help=said)(command)
     return cast(F, click.option("--columns", metavar="NAMES", help=text)(command))
 

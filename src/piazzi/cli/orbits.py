@@ -15,7 +15,6 @@ from piazzi.problem.checks import Array
 STATES = ("x", "y", "z", "vx", "vy", "vz")
 STEP, SPAN = 60.0, 86400.0
 MOST = 10**7  # states
-STEPS = 100  # of order 8 in a turn at the rate of the pericentre: millimetres in a day, as much as edges of the shadow leave
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,20 +64,19 @@ def course_of(text: str, forces: str | None, begin: str | None, chosen: str | No
     if text.lower().endswith(".toml") or (text in names() and not os.path.exists(text)):
         return _of_scenario(text, forces)
     from piazzi.earth.defaults import default_forces, lowest_height, read_forces
-    from piazzi.earth.tides import RADIUS
+    from piazzi.earth.stepping import longest_step
     from piazzi.kernels import RungeKutta8
     from piazzi.orbit.starting import start_of
 
     start = start_of(text, None if begin is None else _date(begin, "--from"), chosen)
     height = lowest_height(start.state[:3], start.state[3:])
     choice = default_forces(height) if forces is None else read_forces(forces, height)
-    turn = float(np.linalg.norm(np.cross(start.state[:3], start.state[3:]))) / (RADIUS + height) ** 2  # rad/s
     P = np.zeros((6, 6)) if start.covariance is None else start.covariance
     problem = Problem(
         choice.forces.model(),
         Gaussian(start.state, P),
         parameters=choice.values,
-        integrator=RungeKutta8(max_step=2 * np.pi / (STEPS * turn)),
+        integrator=RungeKutta8(max_step=longest_step(start.state[:3], start.state[3:])),
         prior_time=0.0,
         name=start.name,
         epoch=start.epoch,

@@ -63,12 +63,13 @@ def command(
         raise click.UsageError("-o -: a page goes into a file", click.get_current_context(silent=True))
     output.check_output(output_file, results.PAGES)
     estimators = options.parsed(names, DEFAULT)
-    from piazzi.cli.sources import run_comparison
+    from piazzi.cli.sources import is_tracking, run_comparison
     from piazzi.present.report import comparison_tab
 
     tabs, success = [], True
     for source in sources:
-        of_rows = (scenario, recording) if source.lower().endswith(".csv") else (None, None)
+        rows = source.lower().endswith(".csv") or is_tracking(source, scenario)
+        of_rows = (scenario, recording) if rows else (None, None)
         name, comparison, warning = run_comparison(source, estimators, seed, *of_rows, bar=True)
         title, radius = results.title_and_planet(source, name, scenario)
         more, well = _more(comparison, lags, seen)

@@ -42,12 +42,17 @@ def load_source(source: str, seed: int, scenario: str | None = None, recording: 
     """What `piazzi.loading` makes of a source, or of standard input for "-"; raises as that does."""
     from piazzi import load
     from piazzi.io.files import RECORDINGS
+    from piazzi.scenarios import Recording
 
     told: dict[str, Any] = {} if recording is None else {"scale": recording.scale, "columns": recording.columns}
     if not source:
         raise click.UsageError("SOURCE is empty", click.get_current_context(silent=True))
     if source.lower().endswith(".csv") and not scenario:
         raise click.UsageError(f"{source}: --scenario NAME says what it measures", click.get_current_context(silent=True))
+    if is_tracking(source, scenario):
+        from piazzi.determination.recorded import recorded
+
+        return Source(*recorded(source, str(scenario), recording or Recording()), os.path.basename(source), True)
     if source != STDIN:
         problem, tracking = load(source, seed=seed, scenario=scenario, **told)
         found = Source(problem, tracking, os.path.basename(source) or source, source.lower().endswith(RECORDINGS))
@@ -64,6 +69,14 @@ def load_source(source: str, seed: int, scenario: str | None = None, recording: 
     found = Source(problem, tracking, STDIN, path.suffix in RECORDINGS)
     _say_moved_prior(found, scenario)
     return found
+
+
+def is_tracking(source: str, scenario: str | None) -> bool:
+    """Whether a source is a file of tracking that a scenario makes a problem of: no recording, and no scenario itself."""
+    from piazzi.loading import KINDS
+    from piazzi.scenarios import names
+
+    return bool(scenario) and not source.lower().endswith(KINDS) and source not in (STDIN, *names())
 
 
 def _say_moved_prior(found: Source, scenario: str | None) -> None:

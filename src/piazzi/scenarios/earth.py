@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from piazzi.scenarios.table import Table
 
 if TYPE_CHECKING:
     from piazzi.earth import Epoch, ForceChoice
+    from piazzi.problem.checks import Array
 
 KINDS = dict.fromkeys(("x", "y", "z"), "length") | dict.fromkeys(("vx", "vy", "vz"), "length/time")
 GROUPS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz")}
@@ -90,6 +91,14 @@ def _refusals(table: Table, key: str) -> Iterator[None]:
         table.fault(key, f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except (ValueError, TypeError) as error:
         table.fault(key, str(error))
+
+
+def step_of(states: Sequence[str], mean: Array) -> float:
+    """The longest step (s) of order 8 on the orbit of a mean state; raises ValueError for one below the surface."""
+    from piazzi.earth.stepping import longest_step
+
+    r, v = (mean[[states.index(name) for name in GROUPS[group]]] for group in ("position", "velocity"))
+    return longest_step(r, v)
 
 
 def names_of(choice: ForceChoice) -> set[str]:

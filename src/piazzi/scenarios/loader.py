@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.kernels import RungeKutta8
 from piazzi.model import Model
 from piazzi.opening import opened
 from piazzi.problem import Problem, with_gauss_markov
@@ -20,7 +21,7 @@ from piazzi.problem.checks import Array
 from piazzi.problem.epochs import epoch_given
 from piazzi.problem.gaps import is_restricted
 from piazzi.problem.truth import true_problem
-from piazzi.scenarios.earth import read_earth, with_forces
+from piazzi.scenarios.earth import read_earth, step_of, with_forces
 from piazzi.scenarios.motion import read_gauss_markov, read_integrator, read_manoeuvres
 from piazzi.scenarios.physics import read_physics
 from piazzi.scenarios.scenario import Picture, Scenario, read_plan, read_recording, read_times
@@ -118,13 +119,24 @@ def _built_in(name: str) -> Scenario:
     return scenario
 
 
-def _read(path: Path) -> tuple[Scenario | None, list[Fault]]:
+def tables_of(source: str | os.PathLike[str]) -> tuple[dict[str, Any], Faults]:
+    """The tables of the scenario of that name or path as they are, and what is wrong with them; raises OSError, ValueError."""
+    text = os.fspath(source)
+    path = FILES / f"{text}.toml" if text in (*names(), TEMPLATE) else Path(text)
+    _check_there(path)
+    faults = Faults()
+    faults.folder = path.parent
+    return _tables(path, faults), faults
+
+
+def _check_there(path: Path) -> None:
     if path.suffix != ".toml" and not path.exists():
         hint = nearest(path.name[:60], names())
         raise ValueError(f"there is no file or scenario {shown(os.fspath(path))}{hint}")
-    faults = Faults()
-    faults.folder = path.parent
-    data = _tables(path, faults)
+
+
+def _read(path: Path) -> tuple[Scenario | None, list[Fault]]:
+    data, faults = tables_of(path)
     scenario = read_scenario(data, path.stem, faults) if not faults else None
     return scenario, list(faults)
 
@@ -202,6 +214,8 @@ def read_problem(file: Table, name: str, units: Units, start: float | None = Non
         places = [s for s in stations if s is not None]
         given = (physics.model, prior, noise, places, parameters, integrator, prior_time, truth, name, manoeuvres)
         problem = Problem(*given, functions=physics.functions, epoch=epoch)
+        if integrator is None and forces is not None:
+            problem = replace(problem, integrator=RungeKutta8(max_step=step_of(physics.states, prior.mean)))
         with file.faults.at("truth"):
             true_problem(problem)
         with file.faults.at("gauss_markov"):

@@ -41,10 +41,22 @@ class Plan:
 
 @dataclass(frozen=True)
 class Recording:
-    """How recordings in CSV are to be read: names of their columns by ours, and the time scale of dates that name none."""
+    """How recordings are to be read.
+
+    Attributes
+    ----------
+    columns : names of columns of CSV by ours
+    scale : the time scale of dates in CSV that name none
+    chosen : the object, in files of tracking of several
+    sigma : standard deviations that such files do not say, as ``range.BER=10m``
+    stations : files of stations for them
+    """
 
     columns: Mapping[str, str] = field(default_factory=dict)
     scale: str | None = None
+    chosen: str | None = None
+    sigma: tuple[str, ...] = ()
+    stations: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +86,10 @@ def read_recording(table: Table) -> Recording:
     """The section [recording]: names of columns, and the scale of dates."""
     inner = table.table("columns")
     columns = {ours: theirs for ours in inner.data if (theirs := inner.text(ours))}
-    scale = table.text("scale")
+    scale, chosen = table.text("scale"), table.text("object")
+    sigma, stations = table.texts("sigma"), table.texts("stations")
     table.finish()
-    return Recording(columns, scale)
+    return Recording(columns, scale, chosen, sigma, stations)
 
 
 def read_plan(table: Table) -> Plan:
