@@ -12,13 +12,14 @@ from piazzi.scenarios import check, load_scenario, names, show
 
 FOUNDING = ["b612-range", "b612-range-q0", "satellite-bearing"]
 STUDIES = ["founding-study", "founding-study-mismatched"]
+ORBITS = ["gps-position", "sun-sync-day"]
 
 
-def test_the_founding_problems_are_built_in():
-    assert names() == sorted(FOUNDING + STUDIES)
+def test_these_problems_are_built_in():
+    assert names() == sorted(FOUNDING + STUDIES + ORBITS)
 
 
-@pytest.mark.parametrize("name", [*FOUNDING, *STUDIES, "template"])
+@pytest.mark.parametrize("name", [*FOUNDING, *STUDIES, *ORBITS, "template"])
 def test_every_shipped_file_passes_its_own_check(name):
     assert check(name) == []
     assert show(name).startswith("#")
