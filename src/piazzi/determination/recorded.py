@@ -13,7 +13,7 @@ from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.estimate.prior import with_prior_at
 from piazzi.formats import read_tracking
 from piazzi.model import Parameter
-from piazzi.model.pruning import used_definitions
+from piazzi.model.pruning import remaining
 from piazzi.orbit.interpolation import interpolated
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
@@ -131,7 +131,7 @@ def _measuring(problem: Problem, found: Measured) -> Problem:
     own = {p.name for p in model.parameters}
     more = [Parameter(name, role) for name, (role, _) in found.parameters.items() if name not in own]  # type: ignore[arg-type]
     kept: dict[str, Any] = {name: dict(getattr(model, name)) for name in ("groups", "units", "memory")}
-    definitions: Any = used_definitions(dict(model.definitions), [*model.dynamics, *seen])
+    definitions: Any = remaining(model.definitions, {}, [*model.dynamics, *seen, *(name for _, name in model.events)])
     measuring = replace(
         model,
         sensors=found.sensors,

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from typing import Any
+
+from piazzi.model.definitions import Definitions
 
 _WORD = re.compile(r"[A-Za-z]\w*")
 
@@ -26,3 +29,11 @@ def redefined(definitions: Mapping[str, str], own: Mapping[str, str]) -> dict[st
     names = {name for left in own for name in _WORD.findall(left)}
     kept = {left: text for left, text in definitions.items() if names.isdisjoint(_WORD.findall(left))}
     return {**kept, **own}
+
+
+def remaining(definitions: Definitions, own: Mapping[str, str], texts: Iterable[str]) -> list[Any]:
+    """Definitions of a model that the texts or `own` need, without those that `own` gives a value anew; then `own`."""
+    names = {name for left in own for name in _WORD.findall(left)}
+    kept = {", ".join(d.provides): d for d in definitions if names.isdisjoint(d.provides)}
+    used = used_definitions({left: " ".join(sorted(d.needs)) for left, d in kept.items()}, [*texts, *own.values()])
+    return [*(d for left, d in kept.items() if left in used), *own.items()]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from piazzi.model import Model, Parameter
-from piazzi.model.pruning import redefined, used_definitions
+from piazzi.model.pruning import remaining
 from piazzi.problem.checks import numeric
 from piazzi.problem.parts import Gaussian, Station, Truth
 from piazzi.problem.problem import Problem
@@ -52,8 +52,8 @@ def _true_model(model: Model, truth: Truth) -> Model:
     rates: Any = {state: truth.dynamics.get(state, text) for state, text in zip(model.states, model.dynamics, strict=True)}
     own = {left: str(text) for left, text in truth.definitions.items()}
     seen = [name for sensor in model.sensors for name in sensor.free_names]
-    users = [*map(str, rates.values()), *own.values(), *seen]
-    definitions: Any = used_definitions(redefined(dict(model.definitions), own), users) | own
+    users = [*map(str, rates.values()), *seen, *(name for _, name in model.events)]
+    definitions: Any = remaining(model.definitions, own, users)
     further = [Parameter(name) for name in truth.parameters if name not in model.parameter_names]
     kept: dict[str, Any] = {name: dict(getattr(model, name)) for name in ("groups", "units", "memory")}
     return replace(
