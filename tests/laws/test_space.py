@@ -1,5 +1,10 @@
-"""A satellite in space: a field of degree 20, Sun and Moon from tables, range with light time, a force of the user's own."""
+"""A satellite in space: field of degree 20, Sun and Moon from tables, sunlight and shadow, range by light time, own force.
 
+Every estimator runs on it, and they agree as their laws say; what it costs to derive.
+"""
+
+import time
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,6 +13,8 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi.earth.gravity import Gravity
+from piazzi.kernels.generate import model_source
+from piazzi.model.derivation import derive, derive_sensor
 from piazzi.model.functions import Signature
 from piazzi.outside.table import Table
 
@@ -69,7 +76,7 @@ def circle(radius, rate):
 
 
 @cache
-def satellite(degree=20, Q=0.0):
+def satellite(degree=20, Q=0.0, thrust="thrust*v{a}/speed"):
     functions = {
         "field": Gravity("EGM2008", degree=degree),
         "fixed": Turn(False),
@@ -84,9 +91,14 @@ def satellite(degree=20, Q=0.0):
         **third("sun", 1.32712440018e20),
         **third("moon", 4.9028e12),
         "speed": "sqrt(vx**2 + vy**2 + vz**2)",
+        "sun_d": "sqrt(sunx**2 + suny**2 + sunz**2)",
+        "along": "(x*sunx + y*suny + z*sunz)/sun_d",
+        "edge": "sqrt(x**2 + y**2 + z**2 - along**2) - 6378137.0",  # from the shadow's edge, a cylinder behind the Earth
+        "lit": "1 - (0.5 - 0.5*tanh(edge/2e4))*(0.5 - 0.5*tanh(along/1e5))",
+        "light": "-9e-8*lit/sun_d",
     }
     dynamics = {"x": "vx", "y": "vy", "z": "vz"}
-    dynamics |= {f"v{a}": f"a{a} + suna{a} + moona{a} + thrust*v{a}/speed" for a in "xyz"}
+    dynamics |= {f"v{a}": f"a{a} + suna{a} + moona{a} + light*sun{a} + {thrust.format(a=a)}" for a in "xyz"}
     light = {
         "root": f"rho/{C} - tau",
         "definitions": {
@@ -173,6 +185,64 @@ def test_a_live_session_is_the_whole_run():
             live.update(station, tracking.padded(1)[2 * k + s], t)
         sigma = np.sqrt(np.diag(whole.covariance[k]))
         assert_allclose(live.mean / sigma, whole.mean[k] / sigma, atol=1e-9)
+
+
+def close_by(Q=1e-10):
+    """The same with a prior so narrow that all is linear: the next order is 1e-6 of it."""
+    prior = pz.Gaussian([7e6, 0.0, 0.0, 0.0, 5.3e3, 5.3e3], [1.0] * 3 + [1e-6] * 3)
+    return replace(satellite(Q=Q), prior=prior)
+
+
+def test_where_all_is_linear_the_graph_is_the_smoother():
+    problem = close_by()
+    tracking = pz.simulate(problem, np.arange(0.0, 3000.0, 30.0), np.random.default_rng(2))
+    smoother, graph = pz.Smoother().estimate(problem, tracking), pz.FactorGraph().estimate(problem, tracking)
+    whole = pz.ExtendedKalmanFilter().estimate(problem, tracking)
+    sigma = np.sqrt(np.diagonal(smoother.covariance, axis1=1, axis2=2))
+    assert np.abs((graph.mean - smoother.mean) / sigma).max() < 1e-3
+    scale = sigma[:, :, None] * sigma[:, None]
+    assert_allclose(graph.covariance / scale, smoother.covariance / scale, atol=1e-4)
+    assert_allclose(smoother.mean[-1], whole.mean[-1], rtol=1e-12)
+    batch = pz.BatchLeastSquares().estimate(close_by(0.0), tracking)
+    still = pz.FactorGraph().estimate(close_by(0.0), tracking)
+    assert np.abs((batch.mean - still.mean) / sigma).max() < 1e-3
+
+
+def test_the_shadow_is_met():
+    problem, tracking = satellite(), tracked()
+    sun = np.array([problem.functions["sun"].value(t) for t in tracking.times])
+    along = (tracking.truth[:, :3] * sun).sum(axis=1) / np.linalg.norm(sun, axis=1)
+    edge = np.sqrt((tracking.truth[:, :3] ** 2).sum(axis=1) - along**2) - 6378137.0
+    dark = (along < 0) & (edge < 0)
+    assert 0 < dark.sum() < len(dark)
+
+
+@pytest.mark.slow
+def test_a_study_runs_on_it(tmp_path):
+    estimators = {"filter": pz.ExtendedKalmanFilter(), "smoother": pz.Smoother()}
+    found = pz.Study(satellite(Q=1e-10), np.arange(0.0, 900.0, 30.0), estimators, runs=4).run(tmp_path / "s.nc", workers=1)
+    assert all(found.row(0, row).success.all() for row in range(len(found.rows)))
+
+
+def test_it_is_derived_in_two_seconds_and_its_source_grows_with_its_definitions():
+    model = satellite().model
+    started = time.process_time()
+    derive.__wrapped__(model)
+    for sensor in model.sensors:
+        derive_sensor.__wrapped__(model, sensor)
+    model_source(model, pz.RungeKutta4(1).scheme, 1)
+    assert time.process_time() - started < 2.0
+
+    def length(bodies):
+        out = {"far": "x"} | {k: v for b in range(bodies) for k, v in third(f"body{b}", 1e20).items()}
+        rates = [" + ".join(["far", *(f"body{b}a{a}" for b in range(bodies))]) for a in "xyz"]
+        functions = {f"body{b}": circle(1e11 + b, 1e-7) for b in range(bodies)}
+        return len(
+            model_source(pz.Model(list("xyz"), rates, definitions=out, functions=functions), pz.RungeKutta4(1).scheme, 1)
+        )
+
+    few, some, many = (length(n) for n in (2, 4, 8))
+    assert many - some < 2.2 * (some - few)
 
 
 def test_another_degree_compiles_nothing_and_moves_the_orbit():

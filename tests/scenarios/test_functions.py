@@ -189,3 +189,20 @@ def test_the_earth_of_a_scenario_is_that_of_python(scenario, tmp_path):
 def test_the_earth_needs_dates(scenario):
     with pytest.raises(ScenarioError, match="needs dates: give the scenario an epoch"):
         load_scenario(scenario(EARTH.replace('epoch = "2016-02-13T16:00:00 UTC"\n', "")))
+
+
+def test_an_interpolation_beside_the_scenario_is_a_function_of_it(scenario, tmp_path, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    rows = [(t, x, np.sin(0.3 * t) * np.cos(x)) for t in np.arange(-2.0, 12.0, 0.25) for x in np.arange(-1.0, 3.01, 0.25)]
+    (tmp_path / "wind.csv").write_text("t,x,w\n" + "".join(f"{t},{x},{w}\n" for t, x, w in rows))
+    wind = 'wind = { kind = "interpolation", file = "wind.csv", outside = ["refuse", "clamp"] }'
+    text = TEXT.replace("[definitions]", f"{wind}\n[definitions]")
+    problem = load_scenario(scenario(text.replace('a = "push(t)"', 'a = "push(t) + wind(t, x)"'))).problem
+    for x in (0.3, 1.7, 3.5):
+        want = push(1.3) + np.sin(0.3 * 1.3) * np.cos(min(x, 3.0)) - x + 0.5 * push(2.3)
+        np.testing.assert_allclose(problem.dynamics([x, 0.2], 1.3)[1], want, atol=1e-4)
+    tracking = pz.simulate(problem, np.arange(0.0, 2.0, 0.1), np.random.default_rng(2))
+    save(tmp_path / "r.nc", problem, tracking)
+    again = pz.load(tmp_path / "r.nc")[0]
+    assert again.checksums == problem.checksums
+    np.testing.assert_array_equal(again.dynamics([1.0, 0.2], 0.7), problem.dynamics([1.0, 0.2], 0.7))
