@@ -83,7 +83,8 @@ def _define(d: Definition, out: dict[str, float], functions: Mapping[str, Any], 
         _solve(d, out, functions, model)
     elif d.function == AT:
         offset = evaluate(d.texts[0], out)
-        out.update(zip(d.names, _elsewhen(out, offset, functions, model), strict=False))
+        there = _nearby if len(d.texts) > 1 else _elsewhen
+        out.update(zip(d.names, there(out, offset, functions, model), strict=False))
     elif d.function in functions:
         arguments = [evaluate(text, out) for text in d.texts]
         try:
@@ -119,18 +120,30 @@ def _solve(d: Definition, out: dict[str, float], functions: Mapping[str, Any], m
     residual(nan)
 
 
+def _rates(values: Mapping[str, float], functions: Mapping[str, Any], model: Any) -> list[float]:
+    """dx/dt at the states and the time among the values."""
+    here = dict(values)
+    wanted = needed(model.dynamics, model.definitions)
+    for d in model.definitions:
+        if set(d.provides) & wanted:
+            _define(d, here, functions, model)
+    return [evaluate(e, here) for e in model.dynamics]
+
+
+def _nearby(values: Mapping[str, float], offset: float, functions: Mapping[str, Any], model: Any) -> Sequence[float]:
+    """States at t + offset to second order: a state whose rate is a state too has the rate of that."""
+    rates = dict(zip(model.states, _rates(values, functions, model), strict=True))
+    second = {s: rates.get(text, 0.0) for s, text in zip(model.states, model.dynamics, strict=True)}
+    return [values[s] + offset * (rates[s] + offset / 2 * second[s]) for s in model.states]
+
+
 def _elsewhen(values: Mapping[str, float], offset: float, functions: Mapping[str, Any], model: Any) -> Sequence[float]:
     """States at t + offset by a few steps of the classical Runge-Kutta method."""
     states, steps = model.states, 4
     x, t, h = [values[s] for s in states], values.get(TIME, 0.0), offset / steps
 
     def rates(x: Sequence[float], t: float) -> list[float]:
-        here = {**values, **dict(zip(states, x, strict=True)), TIME: t}
-        wanted = needed(model.dynamics, model.definitions)
-        for d in model.definitions:
-            if set(d.provides) & wanted:
-                _define(d, here, functions, model)
-        return [evaluate(e, here) for e in model.dynamics]
+        return _rates({**values, **dict(zip(states, x, strict=True)), TIME: t}, functions, model)
 
     for i in range(steps):
         now = t + i * h

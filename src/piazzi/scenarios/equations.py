@@ -42,6 +42,7 @@ class Physics:
     dynamics: dict[str, str] = field(default_factory=dict)
     events: dict[str, str] = field(default_factory=dict)
     defaults: dict[str, dict[str, float]] = field(default_factory=dict)
+    instruments: dict[str, Any] = field(default_factory=dict)
     schedules: dict[str, Schedule | None] = field(default_factory=dict)
 
     @property

@@ -36,6 +36,7 @@ def read_functions(table: Table, epoch: Epoch | None) -> dict[str, Any]:
 def write_function(function: Any) -> dict[str, Any]:
     """The table that `read_functions` reads back; raises ValueError for a function that files cannot hold."""
     from piazzi.earth.gravity import Gravity
+    from piazzi.earth.sensors.turning import EarthVelocity, Spin
     from piazzi.earth.tabulated import Body, Rotation
     from piazzi.outside.interpolation import Interpolation
     from piazzi.outside.table import Table as Samples
@@ -54,10 +55,15 @@ def write_function(function: Any) -> dict[str, Any]:
         return out if function.error is None else out | {"error": function.error}
     if isinstance(function, Rotation):
         out = {"kind": "rotation", "from": function.from_, "to": function.to}
-        return out if function.eop is None else out | {"eop": _written_orientation(function.eop)}
+        return out if function.eop is None else out | {"eop": written_orientation(function.eop)}
     if isinstance(function, Body):
         out = {"kind": "body", "body": function.name, "center": function.center}
         return out if function.kernel is None else out | {"kernel": str(function.kernel)}
+    if isinstance(function, EarthVelocity):
+        return {"kind": "earth_velocity"}
+    if isinstance(function, Spin):
+        out = {"kind": "spin", "frame": function.frame}
+        return out if function.eop is None else out | {"eop": written_orientation(function.eop)}
     raise ValueError(f"function {type(function).__name__} cannot be written to a file: it is known in Python only")
 
 
@@ -70,7 +76,7 @@ def _written_field(function: Any) -> dict[str, Any]:
     return {"kind": "gravity", "numbers": numbers, "gradient_degree": function.gradient_degree, "on": function.on}
 
 
-def _written_orientation(eop: Any) -> Any:
+def written_orientation(eop: Any) -> Any:
     """Constants, or the file that a table is from; raises ValueError for a table that is from none."""
     from piazzi.earth.eop import EOP
 
@@ -164,6 +170,22 @@ def _body(table: Table, epoch: Epoch | None) -> Any:
     return Body(name, epoch, None if kernel is None else _path(table, kernel), center)
 
 
+def _earth_velocity(table: Table, epoch: Epoch | None) -> Any:
+    from piazzi.earth.sensors.turning import EarthVelocity
+
+    return _undated(table, epoch) if epoch is None else EarthVelocity(epoch)
+
+
+def _spin(table: Table, epoch: Epoch | None) -> Any:
+    from piazzi.earth.defaults import read_data
+    from piazzi.earth.sensors.turning import Spin
+
+    frame, eop = table.text("frame", "ITRF"), table.raw("eop")
+    if frame is None or epoch is None:
+        return _undated(table, epoch)
+    return Spin(frame, epoch, None if eop is None else read_data("eop", eop, table.faults.folder))
+
+
 def _undated(table: Table, epoch: Epoch | None) -> None:
     if epoch is None:
         table.fault("kind", "needs dates: give the scenario an epoch, such as epoch = '2016-02-13T16:00:00 UTC'")
@@ -175,4 +197,6 @@ KINDS: Mapping[str, Reader] = {
     "interpolation": _interpolation,
     "rotation": _rotation,
     "body": _body,
+    "earth_velocity": _earth_velocity,
+    "spin": _spin,
 }

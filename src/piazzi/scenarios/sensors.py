@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from piazzi.expressions import check
 from piazzi.model import Sensor
 from piazzi.model.definitions import name_of
-from piazzi.model.functions import AT, STATION
+from piazzi.model.functions import AT, STATION, STATION_TABLE
+from piazzi.scenarios.earth_sensors import plain_sensor, read_instrument, units_of
 from piazzi.scenarios.equations import OWN, Physics, defined_names, equation, provided_names, read_definitions, read_roots
 from piazzi.scenarios.quantities import example_of, named_units, read_schedule, unit_of
 from piazzi.scenarios.table import Table, joined
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
 
 
 def read_sensor(name: str, table: Table, units: Units, out: Physics, epoch: Epoch | None) -> Sensor | None:
-    """A sensor from its components, the names of its stations' own numbers, and what it sees when."""
+    """A sensor from its components, the names of its stations' own numbers, and what it sees when; or of a kind."""
+    if "kind" in table:
+        return _instrument(name, table, units, out, epoch)
     numbers, out.defaults[name] = _own_numbers(table, units)
     out.schedules[name] = read_schedule(table, units, epoch)
     for clash in numbers.keys() & out.units.keys():
@@ -37,20 +40,48 @@ def read_sensor(name: str, table: Table, units: Units, out: Physics, epoch: Epoc
     if not components.data:
         table.fault("components", "is missing: a sensor needs at least one equation")
     equations, angles, kinds = {}, [], {}
+    on_sky: dict[str, str] = {}
+    allowed = {*known, *defined_names(definitions)}
     for key in components.data:
-        equations[key], kinds[key], angle = _component(components, key, {*known, *defined_names(definitions)}, units, outside)
+        equations[key], kinds[key], angle, beside = _component(components, key, allowed, units, outside)
         angles += [key] if angle else []
-    visible = _rules(table, {*known, *defined_names(definitions)})
+        on_sky |= {key: beside} if beside else {}
+    visible = _rules(table, allowed)
     table.finish()
     out.components[name], out.numbers[name] = kinds, numbers
     with table.faults.at(table.path):
         labels = {k: u.label for k, u in kinds.items() if u.label}
         used = Sensor(name, equations, tuple(angles), labels, {}, definitions, visible, roots).free_names
         own = {k: u.label for k, u in numbers.items() if u.label and k in used}
-        sensor = Sensor(name, equations, tuple(angles), labels, own, definitions, visible, roots)
+        sensor = Sensor(name, equations, tuple(angles), labels, own, definitions, visible, roots, on_sky)
         for unused in sorted(numbers.keys() - sensor.free_names):
             table.fault("numbers", f"names {unused!r}, which no equation uses{nearest(unused, sorted(sensor.free_names))}")
         return sensor
+    return None
+
+
+def _instrument(name: str, table: Table, units: Units, out: Physics, epoch: Epoch | None) -> Sensor | None:
+    """A sensor of `piazzi.earth.sensors`; numbers and schedule as any other."""
+    given, usual = _own_numbers(table, units)
+    out.schedules[name] = read_schedule(table, units, epoch)
+    instrument = read_instrument(name, table)
+    if instrument is None:
+        return None
+    known = dict(instrument.defaults)
+    for number in given:
+        if number not in known:
+            table.fault("numbers", f"names {number!r}, which no equation uses{nearest(number, known)}")
+    numbers = {number: given.get(number, ONE) for number in known if number not in out.units}
+    out.defaults[name] = {**{number: known[number] for number in numbers}, **usual}
+    out.components[name], out.numbers[name], out.instruments[name] = units_of(instrument, units), numbers, instrument
+    if epoch is not None:
+        eop = None if out.forces is None else out.forces.eop
+        out.functions |= {key: make(epoch, eop) for key, make in instrument.makers if key not in out.functions}
+    for other in sorted(instrument.free_names - {*known, *out.known, STATION_TABLE}):
+        table.fault("", f"uses {other!r}, which nothing defines: [earth] does, or a parameter is to be named so")
+    labels = {component: unit.label for component, unit in out.components[name].items() if unit.label}
+    with table.faults.at(table.path):
+        return plain_sensor(instrument, labels)
     return None
 
 
@@ -85,15 +116,15 @@ def _rules(table: Table, allowed: Collection[str]) -> tuple[str, ...]:
 
 def _component(
     table: Table, key: str, allowed: Collection[str], units: Units, outside: Collection[str]
-) -> tuple[str, Unit, bool]:
-    """Equation and unit of a component, and whether it is an angle, which wraps."""
+) -> tuple[str, Unit, bool, str]:
+    """Equation and unit of a component, whether it is an angle, which wraps, and beside which other one on the sky."""
     if not isinstance(table.raw(key), Mapping):
         text = equation(table, key, allowed, OWN, outside)
         if units.declared:
             table.fault(key, f"has no unit, but the file is not in SI: write {{ equation = ..., unit = {example_of(units)} }}")
         if "atan2" in text:
             table.fault(key, 'uses atan2: say { equation = ..., unit = "rad" } for an angle, which wraps, or angle = false')
-        return text, ONE, False
+        return text, ONE, False, ""
     inner = table.table(key)
     if "equation" not in inner:
         inner.fault("equation", "is missing")
@@ -102,5 +133,6 @@ def _component(
     angle = inner.flag("angle", unit.is_angle)
     if "atan2" in text and "unit" not in inner and "angle" not in inner:
         inner.fault("unit", 'is missing: say unit = "rad" for an angle, which wraps, or angle = false')
+    beside = inner.text("on_sky", "") or ""
     inner.finish()
-    return text, unit, bool(angle)
+    return text, unit, bool(angle), beside

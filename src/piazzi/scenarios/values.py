@@ -11,6 +11,7 @@ from piazzi.model import Model
 from piazzi.problem import Gaussian, ProcessNoise, Station
 from piazzi.problem.checks import Array, covariance
 from piazzi.problem.constants import constant_name
+from piazzi.scenarios.earth_sensors import PLACE, read_place
 from piazzi.scenarios.equations import Physics
 from piazzi.scenarios.orbit_prior import AXES, names_orbit, read_orbit, to_states
 from piazzi.scenarios.orbit_prior import STATES as ORBIT
@@ -161,7 +162,7 @@ def read_station(table: Table, physics: Physics, units: Units, epoch: Epoch | No
     if sensor not in physics.components:
         if isinstance(table.raw("noise"), Mapping):
             table.table("noise").finish(SPREADS)
-        table.finish(("noise", "numbers", "every", "from", "until"))
+        table.finish(("noise", "numbers", "every", "from", "until", *PLACE))
         return None
     components, own = physics.components[sensor], physics.numbers[sensor]
     if not isinstance(table.raw("noise"), Mapping):
@@ -175,7 +176,9 @@ def read_station(table: Table, physics: Physics, units: Units, epoch: Epoch | No
     before = len(table.faults)
     given = table.table("numbers")
     considered: list[str] = []
+    local, place = read_place(table, physics.instruments.get(str(sensor)), epoch)
     usual = physics.defaults.get(str(sensor), {})
+    usual = usual | {key: value for key, value in local.items() if key in usual}
     numbers = {
         key: usual[key] if key in usual and key not in given else _own_number(key, given, own[key].factor, considered)
         for key in own
@@ -190,7 +193,7 @@ def read_station(table: Table, physics: Physics, units: Units, epoch: Epoch | No
     table.finish()
     if R is None or not name or len(table.faults) > before:
         return None
-    return Station(name, sensor, R, {k: v for k, v in numbers.items() if v is not None}, considered, schedule)
+    return Station(name, sensor, R, {k: v for k, v in numbers.items() if v is not None}, considered, schedule, place)
 
 
 def _own_number(name: str, table: Table, factor: float, considered: list[str]) -> Any:

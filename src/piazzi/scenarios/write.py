@@ -11,6 +11,7 @@ from piazzi.model import Model, Parameter, Sensor
 from piazzi.model.definitions import Definition, Definitions
 from piazzi.model.functions import ROOT, STATION_TABLE
 from piazzi.problem import Gaussian, Problem, ProcessNoise, Schedule, Station, Truth
+from piazzi.scenarios.earth_sensors import write_place
 from piazzi.scenarios.functions import write_function
 from piazzi.scenarios.loader import read_problem
 from piazzi.scenarios.motion import write_integrator, write_manoeuvre
@@ -37,7 +38,7 @@ def problem_to_tables(problem: Problem, *, whole: bool = True) -> dict[str, Any]
     tables: dict[str, Any] = {
         **_equations(problem.model),
         "parameters": {p.name: _parameter(problem, p) for p in problem.model.parameters},
-        "stations": [_station(s) for s in problem.stations],
+        "stations": [_station(s, whole) for s in problem.stations],
         "prior": {"mean": _listed(problem.prior.mean), "covariance": _listed(problem.prior.covariance)},
         "process_noise": _noise(problem.process_noise),
         "integrator": write_integrator(problem.integrator),
@@ -83,13 +84,17 @@ def _equations(model: Model) -> dict[str, Any]:
 
 def _sensor(model: Model, sensor: Sensor) -> dict[str, Any]:
     own = [name for name in model.numbers(sensor) if name != STATION_TABLE]
+    beside = dict(sensor.on_sky)
     rows = zip(sensor.components, sensor.equations, sensor.is_angle, dict(sensor.units).values(), strict=True)
     return {
         **({"visible": list(sensor.visible)} if sensor.visible else {}),
         "numbers": dict.fromkeys(own, "") | dict(sensor.number_units),
         "definitions": _values(sensor.definitions),
         "roots": {d.names[0]: _root(d) for d in sensor.definitions if d.function == ROOT},
-        "components": {c: {"equation": e, "unit": unit, "angle": angle} for c, e, angle, unit in rows},
+        "components": {
+            c: {"equation": e, "unit": unit, "angle": angle} | ({"on_sky": beside[c]} if c in beside else {})
+            for c, e, angle, unit in rows
+        },
     }
 
 
@@ -115,10 +120,13 @@ def _parameter(problem: Problem, parameter: Parameter) -> dict[str, Any]:
     return {"value": float(value), **kind}
 
 
-def _station(station: Station) -> dict[str, Any]:
-    numbers = {k: float(v) for k, v in station.numbers.items()}
+def _station(station: Station, whole: bool) -> dict[str, Any]:
+    numbers = {k: float(v) for k, v in station.numbers.items() if k != STATION_TABLE}
     noise = {"covariance": _listed(station.noise)}
-    return {"name": station.name, "sensor": station.sensor, "noise": noise, "numbers": numbers, **_schedule(station.schedule)}
+    out = {"name": station.name, "sensor": station.sensor, "noise": noise, "numbers": numbers, **_schedule(station.schedule)}
+    if station.place is None:
+        return out
+    return out | {"place": write_place(station.place) if whole else station.place.checksum}
 
 
 def _schedule(schedule: Schedule | None) -> dict[str, float]:
