@@ -40,8 +40,8 @@ def test_exact_fixes_give_the_orbit_back(path):
 
 
 def test_covariance_is_honest_over_seeds(path):
-    """NEES of the six states and the constant at the answer: the mean of 40 is within chi-square's bounds of 99.9 %."""
-    runs, total = 40, 0.0
+    """NEES of the six states and the constant at the answer: the mean of 20 is within chi-square's bounds of 99.9 %."""
+    runs, total = 20, 0.0
     for seed in range(runs):
         noise = SIGMA * np.random.default_rng(100 + seed).standard_normal((len(T), 3))
         one = pz.determine(observations(path[:, :3] + noise, T, SIGMA))

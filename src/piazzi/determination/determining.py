@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.analysis import Analysis, analysed
+from piazzi.determination.approach import approached
 from piazzi.determination.fit import estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
 from piazzi.determination.orbit_forces import chosen_forces
@@ -82,7 +83,8 @@ def determine(
         *tracking, guess=guess, stations=stations, forces=forces, estimate=estimate, consider=consider, mass=mass, area=area,
         com=com, epoch=epoch, frame=frame, object=object, **conventions,
     )  # fmt: skip
-    return solved(given, chosen, axes, scale, say, notes or {})
+    say("approaching")
+    return solved(approached(given), chosen, axes, scale, say, notes or {})
 
 
 def prepared(
@@ -104,7 +106,7 @@ def prepared(
     _, at = _instant(epoch)
     told = dict(conventions) | ({"frame": frame} if frame else {})
     rows = of_object(_observations(tracking, told), object)
-    seen = measured(rows, stations, com=com)
+    seen = measured(rows, stations, com=com, corrected=told.get("corrections") == "applied")
     begin = _guess(guess, seen, object)
     found = chosen_forces(forces, begin.state, name=seen.object, mass=mass, area=area)
     return setup(seen, considered(estimated(found, estimate, seen), consider, seen), begin, at=at)

@@ -19,6 +19,7 @@ from piazzi.problem import Tracking
 from piazzi.problem.checks import Array
 
 DEFAULT = ("graph",)
+TOLERANCE = 1e-4  # sigma, to which batch least squares is taken: below, rounding over days of orbits moves it
 _WINDOW = re.compile(r"window:(\d+(?:\.\d+)?)(min|h|d)(x\d+)?(:.*)?", re.ASCII)
 
 
@@ -51,7 +52,7 @@ def estimate(given: Setup, estimator: Estimator, keep: Array) -> Estimate:
     if isinstance(estimator, FactorGraph) and estimator.start == "ekf":  # what a text without a start means
         estimator = replace(estimator, start=given.states)
     elif isinstance(estimator, BatchLeastSquares) and estimator.start is None:
-        estimator = replace(estimator, start=given.states[0])
+        estimator = replace(estimator, start=given.states[0], tolerance=max(estimator.tolerance, TOLERANCE))
     return estimator.estimate(given.problem, tracking)
 
 

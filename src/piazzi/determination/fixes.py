@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.parts import Part
+from piazzi.determination.sites import Context
 from piazzi.earth import rotation, transform
 from piazzi.earth.rotation import TURNING, frame_named
 from piazzi.formats import Observations
@@ -24,7 +25,7 @@ STATION = "fixes"
 _ORDER = ("x", "y", "z", "vx", "vy", "vz")
 
 
-def fixes(observations: Observations, index: Array, stations: Any) -> Sequence[Part]:
+def fixes(context: Context, index: Array) -> Sequence[Part]:
     """Rows x, y, z of one time and object as positions, those that vx, vy, vz follow as positions with velocities.
 
     Raises
@@ -32,6 +33,7 @@ def fixes(observations: Observations, index: Array, stations: Any) -> Sequence[P
     ValueError
         For axes that are not known or not said, and rows that are no whole fix.
     """
+    observations = context.observations
     place = np.array([_ORDER.index(kind) if kind in _ORDER else -1 for kind in observations.kinds])
     what = place[observations.kind[index]]
     starts = np.flatnonzero(what == 0)

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from piazzi.determination.fixes import fixes
 from piazzi.determination.parts import Part
+from piazzi.determination.ranging import ranges
+from piazzi.determination.sites import Context, sites_of, with_station_sigmas
 from piazzi.earth import Epoch
-from piazzi.formats import Observations
+from piazzi.formats import KINDS, Observations
 from piazzi.model import Sensor
 from piazzi.problem import Station, Tracking
 from piazzi.problem.checks import Array
 
 MOST_SIGMAS = 200  # different noise matrices of one station and sensor; beyond, sigmas are rounded up to two digits
 # kinds of rows, and what makes parts of all rows of these kinds; who takes a kind takes it from all stations
-MAKERS: Mapping[tuple[str, ...], Callable[[Observations, Array, Any], Sequence[Part]]] = {
+MAKERS: Mapping[tuple[str, ...], Callable[[Context, Array], Sequence[Part]]] = {
     ("x", "y", "z", "vx", "vy", "vz"): fixes,
+    ("range",): ranges,
 }
 
 
@@ -57,15 +60,27 @@ class Measured:
         return self.epoch + float(self.tracking.times[0])
 
 
-def measured(observations: Observations, stations: Any = None, *, com: float | None = None) -> Measured:
+def measured(
+    observations: Observations, stations: Any = None, *, com: float | None = None, corrected: bool = False
+) -> Measured:
     """Sensors, stations and tracking of observations of one object.
+
+    Parameters
+    ----------
+    observations : of one object
+    stations : see `sites.sites_of`; default those of the ILRS for lasers
+    com : what ranges are shorter by than to the centre of mass, m; default by the object's name
+    corrected : whether ranges are corrected for media already, which the files do not say
 
     Raises
     ------
     ValueError
         For what the files leave open (with the option that says it), kinds that cannot be used, or no rows.
     """
-    everything = observations
+    sites = sites_of(stations)
+    if sites is None and any(segment.wavelength is not None for segment in observations.segments):
+        sites = sites_of("ilrs")
+    everything = replace(observations, sigma=with_station_sigmas(observations, sites))
     _ask(everything)
     usable = everything.measured & everything.used
     left_out = dict(everything.left_out)
@@ -76,13 +91,11 @@ def measured(observations: Observations, stations: Any = None, *, com: float | N
     index = order[usable[order]]
     if not len(index):
         raise ValueError(f"{_where(everything)}there is no measurement to use")
-    sigma = everything.sigma[index]
-    if np.isnan(sigma).any():
-        kind = everything.kinds[everything.kind[index[np.isnan(sigma)][0]]]
-        raise ValueError(f"{_where(everything)}standard deviations of {kind}: say them with --sigma, as in --sigma {kind}=10m")
-    first = everything.epoch.whole + np.floor(everything.t[index[0]])
-    epoch = Epoch.at(float(first))
-    parts = _parts(everything, index, stations)
+    _check_sigmas(everything, index)
+    epoch = Epoch.at(float(everything.epoch.whole + np.floor(everything.t[index[0]])))
+    known = everything.objects
+    context = Context(everything, epoch, sites, known[0] if known else "", com, corrected)
+    parts = _parts(context, index)
     sensors, places, names, labels = _stations(parts)
     times = np.concatenate([part.t for part in parts]) + (everything.epoch - epoch)
     width = max(part.values.shape[1] for part in parts)
@@ -92,14 +105,26 @@ def measured(observations: Observations, stations: Any = None, *, com: float | N
     tracking = Tracking(times[by_time], values[by_time], np.array(names)[by_time], epoch=epoch)
     in_order = bool(np.all(everything.t[1:] >= everything.t[:-1]))
     sorted_ = () if in_order else ("rows were out of order, and are sorted by time",)
-    known = everything.objects
+    said = [*everything.assumed, *sorted_, *context.said, *(sites.notes if sites else ())]
     return Measured(
-        everything, known[0] if known else "", sensors, places, tracking, rows[by_time], labels, epoch,
+        everything, context.object, sensors, places, tracking, rows[by_time], labels, epoch,
         {name: value for part in parts for name, value in part.functions.items()},
         {name: value for part in parts for name, value in part.parameters.items()},
-        tuple(dict.fromkeys([*everything.assumed, *sorted_, *(text for part in parts for text in part.assumed)])),
+        tuple(dict.fromkeys([*said, *(text for part in parts for text in part.assumed)])),
         left_out,
     )  # fmt: skip
+
+
+def _check_sigmas(observations: Observations, index: Array) -> None:
+    """Raise ValueError where a row has no standard deviation."""
+    lost = np.isnan(observations.sigma[index])
+    if lost.any():
+        kinds = dict.fromkeys(observations.kinds[k] for k in observations.kind[index[lost]])
+        kind = next(iter(kinds))
+        unit = KINDS[kind].unit
+        raise ValueError(
+            f"{_where(observations)}standard deviations of {', '.join(kinds)}: say them, as in --sigma {kind}=10{unit}"
+        )
 
 
 def of_object(observations: Observations, chosen: str | None) -> Observations:
@@ -119,7 +144,8 @@ def of_object(observations: Observations, chosen: str | None) -> Observations:
 
 def _ask(observations: Observations) -> None:
     """Raise ValueError for what is open."""
-    waiting = [text for text in observations.open if "--" in text]
+    known = not np.isnan(observations.sigma[observations.measured & observations.used]).any()
+    waiting = [text for text in observations.open if "--" in text and not (known and "--sigma" in text)]
     if waiting:
         more = f" (and {len(waiting) - 1} more: piazzi tracking lists them)" if len(waiting) > 1 else ""
         raise ValueError(f"{_where(observations)}the file does not say {_plain(waiting[0])}{more}")
@@ -133,15 +159,16 @@ def _where(observations: Observations) -> str:
     return f"{observations.files[0]}: " if observations.files else ""
 
 
-def _parts(observations: Observations, index: Array, stations: Any) -> list[Part]:
+def _parts(context: Context, index: Array) -> list[Part]:
     """Parts of all rows, in the order of `MAKERS`; raises ValueError for kinds that none of them takes."""
+    observations = context.observations
     found: list[Part] = []
     kinds = observations.kind[index]
     taken = np.zeros(len(index), dtype=np.bool_)
     for names, maker in MAKERS.items():
         own = np.isin(kinds, [i for i, kind in enumerate(observations.kinds) if kind in names])
         if own.any():
-            found += maker(observations, index[own], stations)
+            found += maker(context, index[own])
             taken |= own
     if not taken.all():
         kind = observations.kinds[kinds[~taken][0]]

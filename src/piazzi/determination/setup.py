@@ -77,6 +77,13 @@ def setup(
     return Setup(measured, chosen, guess, problem, tracking, rows, states, solution, assumed)
 
 
+def with_prior(given: Setup, states: Array, covariance: Array) -> Setup:
+    """The same with states (K, n) to begin from, and a prior about the first of them of this covariance."""
+    count = len(given.problem.model.states)
+    prior = Gaussian(states[0, :count], covariance[:count, :count])
+    return replace(given, problem=replace(given.problem, prior=prior), states=states)
+
+
 def _problem(measured: Measured, chosen: Chosen, guess: Guess, roles: Mapping[str, str], values: Mapping[str, Any]) -> Problem:
     own = {name: role for name, (role, _) in measured.parameters.items()}
     every = {**chosen.roles, **own, **roles}
@@ -88,10 +95,17 @@ def _problem(measured: Measured, chosen: Chosen, guess: Guess, roles: Mapping[st
         stations=measured.stations,
         parameters=numbers,
         integrator=RungeKutta8(max_step=chosen.max_step),
-        functions={**chosen.forces.functions(measured.epoch), **measured.functions},
+        functions={**chosen.choice.functions(measured.epoch), **measured.functions},
         epoch=measured.epoch,
         name=measured.object,
     )
+
+
+def scale_of(given: Setup, first: Array) -> Array:
+    """Units (n,) of a state: a tenth of distance and speed, and the sigmas of constants before the measurements."""
+    sigma = np.sqrt(np.diag(given.problem.covariance)).copy()
+    sigma[:3], sigma[3:6] = WIDE * np.linalg.norm(first[:3]), WIDE * np.linalg.norm(first[3:6])
+    return np.where(sigma > 0, sigma, 1.0)
 
 
 def _prior(mean: Array) -> Gaussian:

@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi.determination.document import document
 from piazzi.determination.setup import Setup
+from piazzi.determination.verdict import apart_by
 from piazzi.evaluate.grids import Grid, as_html, as_rich
 from piazzi.evaluate.quantities import display_of, number, with_sigma
 from piazzi.text import printable
@@ -104,12 +105,9 @@ def _rejected(facts: dict[str, Any]) -> Grid:
 
 
 def _estimators(found: Any) -> Grid:
-    k, answer = found.setup.solution, found.estimate
-    sigma = np.sqrt(np.maximum(np.diag(answer.covariance[k])[:6], 0.0))
     rows = []
     for name, one in found.estimates.items():
-        with np.errstate(all="ignore"):
-            off = float(np.max(np.abs(one.mean[k, :6] - answer.mean[k, :6]) / sigma))
+        off = apart_by(found.estimate, one, found.setup.solution)
         rows.append((name, "yes" if one.success else "no", str(one.iterations), number(off, 3), one.message))
     return Grid("Estimators", ("", "success", "iterations", "apart\n[sigma]", "message"), tuple(rows))
 

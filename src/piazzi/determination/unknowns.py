@@ -8,12 +8,10 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
-from piazzi.determination.orbit_forces import COEFFICIENTS, Chosen
+from piazzi.determination.orbit_forces import ACCELERATION, COEFFICIENTS, Chosen
 from piazzi.determination.sensing import Measured
 from piazzi.problem import Gaussian
 from piazzi.text import nearest, one_line
-
-EMPIRICAL = 1e-7  # m/s2: sigma of a constant acceleration that is estimated
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ def estimated(chosen: Chosen, given: Any, seen: Measured) -> Chosen:
             )
         before = values.get(name)
         mean = float(before.mean[0]) if isinstance(before, Gaussian) else float(before or 0.0)
-        usual = float(before.covariance[0, 0]) ** 0.5 if isinstance(before, Gaussian) else 0.5 * abs(mean) or EMPIRICAL
+        usual = float(before.covariance[0, 0]) ** 0.5 if isinstance(before, Gaussian) else 0.5 * abs(mean) or ACCELERATION
         sigma = one.sigma * (abs(mean) if one.name in COEFFICIENTS else 1.0) if one.sigma is not None else usual
         roles[name], values[name] = "estimated", Gaussian(mean, sigma**2)
     return replace(chosen, roles=roles, values=values)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.analysis import Analysis
-from piazzi.determination.setup import WIDE, Setup
+from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.information import singular
@@ -67,12 +67,6 @@ def verdict(
     )
 
 
-def scale_of(given: Setup) -> Array:
-    """Units of the first state (n,): the sigma of the guess, and of the priors of constants."""
-    sigma = np.sqrt(np.diag(given.problem.covariance))
-    return np.where(sigma > 0, sigma, 1.0)
-
-
 def seen(given: Setup, analysis: Analysis | None, keep: Array) -> Sentence:
     """Whether the measurements alone determine the six values of the orbit."""
     test = (
@@ -80,7 +74,7 @@ def seen(given: Setup, analysis: Analysis | None, keep: Array) -> Sentence:
     )
     if analysis is None:
         return Sentence(None, None, test, "Seen: the fit gave no orbit to ask this of.")
-    scale = scale_of(given)
+    scale = scale_of(given, given.states[0])
     values, directions = singular(analysis.information(keep, scale))
     smallest, weakest = float(values[-1]), directions[-1] * scale
     many = int(np.isfinite(analysis.whitened[keep]).sum())
@@ -123,7 +117,7 @@ def converged(given: Setup, answer: Estimate, analysis: Analysis | None, keep: A
         return Sentence(False, None, test, f"Not converged: {answer.message}.")
     if analysis is None or answer.view != "delayed" or not given.problem.is_noise_free or "weights" in answer.details:
         return Sentence(True, None, test, f"Converged: the estimator ended after {_count(answer.iterations, 'iteration')}.")
-    scale = scale_of(given)
+    scale = scale_of(given, given.states[0])
     left = analysis.step(keep, analysis.information(keep, scale), scale)
     if not left <= STILL:
         return Sentence(False, left, test, f"Not converged: another step would go {number(left, 2)} sigma.")
@@ -161,17 +155,15 @@ def honest(given: Setup, analysis: Analysis | None, keep: Array) -> Sentence:
 
 def agreed(given: Setup, name: str, estimates: Mapping[str, Estimate]) -> Sentence:
     """Whether the other estimators say the same."""
-    test = f"largest difference of a state in sigma: up to {NEAR:g} with all measurements, up to {APART:g} in real time"
+    test = f"largest difference of a state in sigma: up to {NEAR:g} of all measurements, {APART:g} of its own in real time"
     others = {other: e for other, e in estimates.items() if other != name}
     if not others:
         return Sentence(None, None, test, "Agreed: only one estimator was asked; --with names more.")
     k, answer = given.solution, estimates[name]
-    sigma = np.sqrt(np.maximum(np.diag(answer.covariance[k])[:6], 0.0))
     apart: dict[str, float] = {}
     wrong: list[str] = []
     for other, estimate in others.items():
-        with np.errstate(all="ignore"):
-            off = float(np.max(np.abs(estimate.mean[k, :6] - answer.mean[k, :6]) / sigma))
+        off = apart_by(answer, estimate, k)
         apart[other] = off
         limit = NEAR if estimate.view == "delayed" else APART
         if not (estimate.success and off <= limit):
@@ -180,6 +172,14 @@ def agreed(given: Setup, name: str, estimates: Mapping[str, Estimate]) -> Senten
     if wrong:
         return Sentence(False, worst, test, f"Not agreed: {', '.join(wrong)}.")
     return Sentence(True, worst, test, f"Agreed: {', '.join(others)} within {number(worst, 2)} sigma.")
+
+
+def apart_by(answer: Estimate, other: Estimate, k: int) -> float:
+    """The largest difference of a state at an epoch, in sigma of the answer, or of the other where it is in real time."""
+    covariance = (answer if other.view == "delayed" else other).covariance[k]
+    with np.errstate(all="ignore"):
+        sigma = np.sqrt(np.maximum(np.diag(covariance)[:6], 0.0))
+        return float(np.max(np.abs(other.mean[k, :6] - answer.mean[k, :6]) / sigma))
 
 
 def _count(many: int, what: str) -> str:

@@ -11,6 +11,7 @@ from piazzi.model.definitions import TIME, Definition, Definitions, needed
 from piazzi.model.functions import AT, ROOT
 
 MOST_ITERATIONS = 50
+SHORT = 1.0  # s
 
 
 def with_values(
@@ -138,8 +139,8 @@ def _nearby(values: Mapping[str, float], offset: float, functions: Mapping[str, 
 
 
 def _elsewhen(values: Mapping[str, float], offset: float, functions: Mapping[str, Any], model: Any) -> Sequence[float]:
-    """States at t + offset by a few steps of the classical Runge-Kutta method."""
-    states, steps = model.states, 4
+    """States at t + offset by a few steps of the classical Runge-Kutta method, a light time by one."""
+    states, steps = model.states, 4 if abs(offset) > SHORT else 1
     x, t, h = [values[s] for s in states], values.get(TIME, 0.0), offset / steps
 
     def rates(x: Sequence[float], t: float) -> list[float]:

@@ -1,0 +1,177 @@
+"""From a guess to near the answer: damped least squares in elements at the date of the guess, over a span that grows.
+
+An orbit that is a little wrong at its date is very wrong days later.  Corrected at the date of the guess, and in elements, it
+bends less than anywhere else; and measurements that are near that date say in which turn the others are.
+
+What is found only says where estimators begin: their prior is about it, and much wider than what the measurements leave.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, pi
+
+import numpy as np
+
+from piazzi.determination.analysis import analysed
+from piazzi.determination.guesses import MU
+from piazzi.determination.orbit_forces import turning
+from piazzi.determination.setup import Setup, follow, scale_of, with_prior
+from piazzi.evaluate.information import factor
+from piazzi.orbit import ModifiedEquinoctial
+from piazzi.problem.checks import Array
+
+ENOUGH = 9  # values that a span begins with
+SHORT, LONG = 8, 40  # steps over a span that still grows, and over all
+STILL = 1e-3  # of the cost, by which a step must lower it to be followed by another
+LARGEST = 1e10  # of the damping
+LEAST = 1e-8
+WIDER = 100.0  # times the sigma that measurements leave is that of the prior: a share of 1e-4 of what they know
+SPREAD = 2.5  # times the median residual, from which on a row counts less and less
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A trial: the state and constants at the date of the guess, and all that follows from it.
+
+    `rows` are the derivatives of the whitened residuals by elements and constants.
+    """
+
+    first: Array
+    states: Array
+    whitened: Array
+    rows: Array
+
+
+def approached(given: Setup) -> Setup:
+    """The set-up with states, and a prior mean, that are near the answer; itself where nothing nearer was found."""
+    times = given.tracking.times
+    begun = float(np.clip(given.guess.epoch - given.measured.epoch, times[0], times[-1]))
+    first = _state_at(given, begun)
+    here = _place(given, begun, first)
+    if here is None:
+        return given
+    unit = scale_of(given, first)
+    before = first
+    away = np.abs(given.tracking.row_times - begun)
+    there = np.isfinite(given.tracking.values)
+    half = pi / turning(first[:6])
+    while True:
+        rows = away <= half
+        whole = bool(rows.all())
+        if there[rows].sum() >= ENOUGH or whole:
+            here = _fitted(given, begun, here, rows, unit, before, LONG if whole else SHORT)
+        if whole:
+            return with_prior(given, here.states, _wide(given, here))
+        half *= 2.0
+
+
+def _wide(given: Setup, here: Place) -> Array:
+    """Covariance (n, n) of a prior that is `WIDER` than what the measurements leave, and nowhere wider than a guess."""
+    unit = scale_of(given, here.states[0])
+    keep = np.ones(len(given.rows), dtype=np.bool_)
+    root = factor(np.vstack([analysed(given, here.states).information(keep, unit) / WIDER, np.eye(len(unit))]))
+    inverse = np.linalg.solve(root, np.eye(len(unit)))
+    return np.asarray(inverse @ inverse.T * np.outer(unit, unit))
+
+
+def _state_at(given: Setup, t: float) -> Array:
+    """States and constants of the guess at a time within the measurements."""
+    k = int(np.clip(np.searchsorted(given.tracking.times, t, side="right") - 1, 0, len(given.states) - 1))
+    start = float(given.tracking.times[k])
+    if t == start:
+        return np.array(given.states[k])
+    return np.asarray(follow(given.problem, np.array([start, t]), given.states[k], given.chosen.max_step)[0][-1])
+
+
+def _place(given: Setup, begun: float, first: Array) -> Place | None:
+    """All that follows from a state; None where the orbit ends, or measurements have no prediction."""
+    times, step = given.tracking.times, given.chosen.max_step
+    try:
+        gap = begun - float(times[0])
+        nodes = np.linspace(begun, float(times[0]), max(ceil(gap / step), 1) + 1) if gap > 0 else np.array([begun])
+        back, Phi = follow(given.problem, nodes, first, step)
+        states = follow(given.problem, times, back[-1], step)[0]
+        found = analysed(given, states)
+        kind = ModifiedEquinoctial()
+        elements = kind.from_state(first[:3], first[3:6], MU)
+        change = np.eye(len(first))
+        change[:6, :6] = kind.jacobian_to_state(elements, MU)
+    except ValueError:
+        return None
+    for one in Phi:
+        change = one @ change
+    there = np.isfinite(given.tracking.values)
+    if not (np.isfinite(found.whitened[there]).all() and np.isfinite(found.rows[there]).all()):
+        return None
+    return Place(first, states, found.whitened, found.rows @ change)
+
+
+def _moved(first: Array, step: Array) -> Array:
+    """The state after a step in elements and constants; raises ValueError where that is no orbit."""
+    kind = ModifiedEquinoctial()
+    elements = kind.from_state(first[:3], first[3:6], MU) + step[:6]
+    r, v = kind.to_state(elements, MU)
+    return np.concatenate([r, v, first[6:] + step[6:]])
+
+
+def _fitted(given: Setup, begun: float, here: Place, rows: Array, unit: Array, before: Array, steps: int) -> Place:
+    """The nearest minimum from the rows (J,), by Levenberg and Marquardt's steps, with a loss that outliers do not rule."""
+    damping = 1e-6
+    for _ in range(steps):
+        scale = _scale(here.whitened[rows])
+        cost = _cost(given, here, rows, scale, unit, before)
+        better = None
+        while better is None and damping < LARGEST:
+            trial = _tried(given, begun, here, rows, unit, before, scale, damping)
+            new = np.inf if trial is None else _cost(given, trial, rows, scale, unit, before)
+            if trial is not None and new < cost:
+                better = trial
+                damping = max(damping / 30.0, LEAST)
+            else:
+                damping *= 30.0
+        if better is None:
+            return here
+        here = better
+        if cost - new < STILL * cost:
+            return here
+    return here
+
+
+def _tried(
+    given: Setup, begun: float, here: Place, rows: Array, unit: Array, before: Array, scale: float, damping: float
+) -> Place | None:
+    w, J = here.whitened[rows].reshape(-1), here.rows[rows].reshape(-1, len(unit))
+    there = np.isfinite(w)
+    weight = 1.0 / np.sqrt(1.0 + (w[there] / scale) ** 2)
+    T = _change(here.first)
+    own = T / unit[:, None]  # of the prior, by elements and constants
+    A = np.vstack([weight[:, None] * J[there], own])
+    b = np.concatenate([weight * w[there], (before - here.first) / unit])
+    size = np.linalg.norm(A, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    A = np.vstack([A / size, np.sqrt(damping) * np.eye(len(unit))])
+    step = np.linalg.lstsq(A, np.append(b, np.zeros(len(unit))), rcond=None)[0] / size
+    try:
+        return _place(given, begun, _moved(here.first, step))
+    except ValueError:
+        return None
+
+
+def _change(first: Array) -> Array:
+    kind = ModifiedEquinoctial()
+    out = np.eye(len(first))
+    out[:6, :6] = kind.jacobian_to_state(kind.from_state(first[:3], first[3:6], MU), MU)
+    return out
+
+
+def _scale(whitened: Array) -> float:
+    known = np.abs(whitened[np.isfinite(whitened)])
+    return SPREAD * max(1.0, 1.4826 * float(np.median(known))) if known.size else SPREAD
+
+
+def _cost(given: Setup, place: Place, rows: Array, scale: float, unit: Array, before: Array) -> float:
+    """Cauchy's, and that of the prior."""
+    w = place.whitened[rows]
+    w = w[np.isfinite(w)]
+    return float(scale**2 * np.log1p((w / scale) ** 2).sum() + (((place.first - before) / unit) ** 2).sum())

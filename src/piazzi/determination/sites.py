@@ -1,0 +1,119 @@
+"""Stations on the ground by the names that files call them, with the weather of a pass."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from piazzi.earth import Epoch, Station, StationList, Weather, ilrs_stations, read_stations
+from piazzi.formats import Observations
+from piazzi.problem.checks import Array
+from piazzi.text import nearest
+
+OWN = ("ilrs",)  # lists of stations that the package has
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """What makers of parts share.
+
+    Attributes
+    ----------
+    observations : rows of one object, with sigmas of the station files where they had none
+    epoch : time zero of the problem
+    sites : stations, None where nobody gave any
+    object : name of what is seen
+    com : centre of mass, m, where the user says it
+    corrected : whether the user says that ranges are corrected for media already
+    """
+
+    observations: Observations
+    epoch: Epoch
+    sites: StationList | None
+    object: str
+    com: float | None = None
+    corrected: bool = False
+    said: dict[str, None] = field(default_factory=dict)
+
+    def site(self, index: int) -> Station:
+        """The station of a participant; raises ValueError with how to give it."""
+        name = self.observations.participants[index] if index >= 0 else ""
+        if not name:
+            raise ValueError(f"{self.where}the file does not say which station measured: no station can be found for it")
+        if self.sites is None:
+            raise ValueError(f"{self.where}where is station {name}? Give it with --stations FILE (TOML or SINEX), or ilrs")
+        found = _matched(name, self.sites)
+        if found is None:
+            raise ValueError(f"{self.where}no station {name} in --stations{nearest(name, list(self.sites)[:2000])}")
+        return found
+
+    @property
+    def where(self) -> str:
+        """How messages begin."""
+        return f"{self.observations.files[0]}: " if self.observations.files else ""
+
+
+def _matched(name: str, sites: StationList) -> Station | None:
+    """A station by its name, or by it without leading zeros or the letter of its point."""
+    for known in (name, name.lstrip("0"), f"{name}A"):
+        if known in sites:
+            return sites[known]
+    plain = {site.lstrip("0").casefold(): site for site in sites}
+    key = plain.get(name.lstrip("0").casefold())
+    return None if key is None else sites[key]
+
+
+def sites_of(given: Any) -> StationList | None:
+    """The stations that a user gives: files, ``ilrs``, stations, lists of them; None for none."""
+    if given is None or (isinstance(given, (list, tuple)) and not given):
+        return None
+    if isinstance(given, StationList):
+        return given
+    items: Iterable[Any] = [given] if isinstance(given, (str, os.PathLike, Station)) else given
+    files: list[Any] = []
+    found: list[Station] = []
+    for item in items:
+        if isinstance(item, Station):
+            found.append(item)
+        elif isinstance(item, StationList):
+            found += item.stations
+        elif item in OWN:
+            found += ilrs_stations().stations
+        elif item == "mpc":
+            raise ValueError("--stations mpc: the list of observatory codes is no part of the package: name its file")
+        else:
+            files.append(item)
+    if files:
+        found += read_stations(*files).stations
+    unique = {station.name: station for station in reversed(found)}  # the first of a name counts
+    return StationList(tuple(reversed(unique.values())))
+
+
+def weather_of(observations: Observations, rows: Array, station: Station, epoch: Epoch) -> tuple[Weather, bool]:
+    """The mean weather of rows, and whether it was measured; what is missing is standard for the height."""
+    standard = Weather.standard(station.place(epoch)[2])
+    values, measured = {}, True
+    for name in ("pressure", "temperature", "humidity"):
+        column = getattr(observations, name)[rows]
+        known = column[np.isfinite(column)]
+        measured &= bool(known.size)
+        values[name] = float(known.mean()) if known.size else getattr(standard, name)
+    return Weather(**values), measured
+
+
+def with_station_sigmas(observations: Observations, sites: StationList | None) -> Array:
+    """Sigmas (J,), those of the station files where rows have none."""
+    sigma: Array = observations.sigma
+    if sites is None or not np.isnan(sigma).any():
+        return sigma
+    sigma = sigma.copy()
+    for i in np.unique(observations.station):
+        site = None if i < 0 else _matched(observations.participants[i], sites)
+        for kind, value in (site.sigma if site else {}).items():
+            own = np.isnan(sigma) & (observations.station == i) & observations.of_kind(kind)
+            sigma[own] = value
+    return sigma

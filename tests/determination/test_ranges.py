@@ -1,0 +1,147 @@
+"""Orbits from ranges to stations on the ground: what is assumed and asked for, honest covariances, and a real satellite."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi import earth
+from piazzi.determination import Guess
+from piazzi.determination.approach import approached
+from piazzi.determination.determining import prepared, solved
+from piazzi.determination.fit import estimators
+from piazzi.estimate.chi_square import quantile
+from piazzi.evaluate.information import predicted
+from piazzi.formats import Correction, Observations, Segment
+from piazzi.problem.inputs import prepare
+
+EPOCH = pz.Epoch("2016-02-13T12:00:00 UTC")
+STATE = np.array([9643000.0, 6000000.0, 4600000.0, -3600.0, 4000.0, 1800.0])  # m, m/s, GCRF: near 12,000 km
+SITES = ("7090", "7119", "7825", "7941")
+SIGMA = 0.03
+
+
+def ranges(t, stations, values=None, **segment):
+    """Two-way laser ranges at transmission, in order of time."""
+    told = {"way": "two-way", "range_is": "half", "tag": "transmit", "wavelength": 5.32e-7} | segment
+    return Observations(
+        epoch=EPOCH,
+        t=t,
+        value=np.full(len(t), 7e6) if values is None else values,
+        kinds=("range",),
+        kind=np.zeros(len(t), dtype=int),
+        participants=(*SITES, "LAGEOS-2"),
+        station=stations,
+        object=len(SITES),
+        segments=(Segment("UTC", **told),),
+        sigma=SIGMA,
+        tag=1,
+    )
+
+
+@pytest.fixture(scope="module")
+def given():
+    """A day of passes over four stations, whose values are those of the orbit without noise; the setup that they make."""
+    t = np.concatenate([3600.0 * k + np.arange(0.0, 1500.0, 300.0) for k in range(0, 24, 2)])
+    station = np.repeat(np.arange(12) % 4, 5)
+    made = prepared(ranges(t, station), guess=Guess(EPOCH, STATE[:3], STATE[3:], "test"), stations="ilrs")
+    inputs = prepare(made.problem, made.tracking)
+    z = predicted(made.problem, inputs, made.states)
+    return replace(
+        made, tracking=pz.Tracking(made.tracking.row_times, z, made.tracking.row_stations, epoch=made.tracking.epoch)
+    )
+
+
+def noisy(given, seed, off=0.0):
+    rng = np.random.default_rng(seed)
+    z = given.tracking.values + SIGMA * rng.standard_normal(given.tracking.values.shape)
+    tracking = pz.Tracking(given.tracking.row_times, z, given.tracking.row_stations, epoch=given.tracking.epoch)
+    guess = replace(given.guess, position=given.guess.position + off)
+    return replace(given, tracking=tracking, guess=guess)
+
+
+def test_covariance_is_honest_over_seeds(given):
+    runs, total = 12, 0.0
+    for seed in range(runs):
+        one = approached(noisy(given, seed))
+        found = solved(one, estimators(("graph",)))
+        assert found.determined
+        error = found.estimate.mean[-1] - given.states[-1]
+        P = found.estimate.covariance[-1]
+        scale = np.sqrt(np.diag(P))
+        total += error / scale @ np.linalg.solve(P / np.outer(scale, scale), error / scale)
+    assert quantile(0.0005, 6 * runs) < total < quantile(0.9995, 6 * runs)
+
+
+def test_estimators_agree_also_in_real_time(given):
+    found = solved(approached(noisy(given, 1)), estimators(["graph", "batch", "ekf"]))
+    assert found.verdict["agreed"].ok is True
+
+
+def test_what_is_assumed(given):
+    said = " ".join(given.assumed)
+    assert "centre of mass of LAGEOS-2: 0.251 m" in said and "weather at 7090: standard" in said
+    numbers = [s.numbers for s in given.problem.stations]
+    assert all(n["centre_of_mass"] == 0.251 and n["wavelength"] == 5.32e-7 for n in numbers)
+
+
+def test_what_is_applied_already_is_not_applied_again():
+    t, station = np.arange(3.0), np.zeros(3, dtype=int)
+    said = (Correction("troposphere", None, True), Correction("centre of mass", None, True))
+    made = prepared(ranges(t, station, corrections=said), guess=Guess(EPOCH, STATE[:3], STATE[3:], "test"))
+    assert all("mendes" not in s.name for s in made.problem.model.sensors)
+    assert all(s.numbers["centre_of_mass"] == 0.0 for s in made.problem.stations)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"way": None}, "--range two-way"),
+        ({"way": "three-way"}, "three-way ranges are not determined from yet"),
+        ({"range_is": None}, "--range round-trip"),
+        ({"mode": "single_diff"}, "differences of ranges"),
+    ],
+)
+def test_what_is_open_is_asked_for(change, says):
+    with pytest.raises(ValueError, match=says):
+        prepared(ranges(np.arange(3.0), np.zeros(3, dtype=int), **change), guess=Guess(EPOCH, STATE[:3], STATE[3:], "test"))
+
+
+def test_a_station_that_nobody_gave():
+    rows = replace(ranges(np.arange(3.0), np.zeros(3, dtype=int)), participants=("NOWHERE", *SITES[1:], "LAGEOS-2"))
+    with pytest.raises(ValueError, match="no station NOWHERE in --stations"):
+        prepared(rows, guess=Guess(EPOCH, STATE[:3], STATE[3:], "test"))
+    radio = replace(rows, segments=(replace(rows.segments[0], wavelength=None),))
+    with pytest.raises(ValueError, match="where is station NOWHERE"):
+        prepared(radio, guess=Guess(EPOCH, STATE[:3], STATE[3:], "test"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("off", [0.0, 6e4])
+def test_lageos_2_by_one_command(data_dir, tmp_path, off):
+    """State within 0.7 m of the published one, residuals below 0.06 m, a day of another's prediction within 0.5 m."""
+    folder = data_dir / "earth" / "lageos2"
+    place = ("x", 7526990.0), ("y", -9646310.0), ("z", 1464110.0)
+    guess = " ".join(f"{name}={value + off}m" for name, value in place) + " vx=3033m/s vy=1715m/s vz=-4447m/s"
+    found = pz.determine(
+        folder / "lageos2_20160214.npt",
+        guess=f"{guess} epoch=2016-02-13T16:00:00Z frame=EME2000",
+        stations=[folder / "SLRF2014_POS+VEL_2030.0_200428.snx"],
+        epoch="2016-02-13T16:00:00 UTC",
+        frame="EME2000",
+    )
+    assert found.determined
+    published = [7526994.072, -9646309.832, 1464110.239]
+    assert np.linalg.norm(found.orbit.at()[:3] - published) < 0.7
+    assert np.sqrt(np.mean(found.analysis.residual[found.setup.rows >= 0] ** 2)) < 0.06
+    found.write(tmp_path / "l2.oem", span=("2016-02-13T00:00:00 UTC", "2016-02-14T00:00:00 UTC"), step=300.0)
+    assert pz.difference(tmp_path / "l2.oem", folder / "lageos2_cpf_160213_5441.sgf").rms_3d < 0.5
+
+
+def test_the_station_of_a_file_gives_its_sigma(tmp_path):
+    site = earth.ilrs_stations()["7090"]
+    known = replace(site, sigma={"range": 0.5})
+    rows = replace(ranges(np.arange(3.0), np.zeros(3, dtype=int)), sigma=np.nan)
+    made = prepared(rows, guess=Guess(EPOCH, STATE[:3], STATE[3:], "test"), stations=[known])
+    assert np.sqrt(made.problem.stations[0].noise[0, 0]) == pytest.approx(0.5)
