@@ -12,7 +12,7 @@ import numpy as np
 from piazzi.earth import ForceChoice, Forces, LaserSphere, laser_sphere, read_forces
 from piazzi.earth.constants import GM
 from piazzi.earth.defaults import AIR_BELOW, lowest_height
-from piazzi.earth.forces import EMPIRICAL
+from piazzi.earth.force_options import CONSTANT
 from piazzi.orbit import Keplerian
 from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
@@ -75,8 +75,8 @@ def chosen_forces(
         "drag": forces.drag or None, "empirical": list(forces.empirical),
     }  # fmt: skip
     left_out = {}
-    if forces.drag == "exponential":
-        left_out["density"] = "air falls off exponentially and does not follow the Sun, which may be half of the drag"
+    if forces.drag in ("exponential", "harris-priester"):
+        left_out["density"] = "air does not follow the activity of the Sun from day to day, which may be half of the drag"
     elif lowest_height(state[:3], state[3:]) < AIR_BELOW and not forces.drag:
         left_out["drag"] = "there is air at this height, and no drag among the forces"
     return Chosen(choice, roles, values, facts, 2.0 * pi / (STEPS * turning(state)), left_out, assumed)
@@ -106,7 +106,9 @@ def _coefficients(
     roles: dict[str, str] = {}
     values: dict[str, Any] = dict(choice.values)
     open_ = {text.partition(" = ")[0] for text in choice.assumed}
-    assumed = [text for text in choice.assumed if text.partition(" = ")[0] not in (*COEFFICIENTS.values(), *EMPIRICAL)]
+    accelerations = [name for name in choice.forces.parameters if name in open_ and name.partition("_")[0] in CONSTANT]
+    own = {*COEFFICIENTS.values(), *accelerations}
+    assumed = [text for text in choice.assumed if text.partition(" = ")[0] not in own]
     ratio, sphere = _ratio(name, mass, area)
     for parameter, coefficient in (("cr_a_m", CR), ("cd_a_m", CD)):
         if parameter not in open_:
@@ -120,10 +122,9 @@ def _coefficients(
         spread = mean if ratio is None else 0.5 * mean
         values[parameter] = Gaussian(mean, spread**2)
         assumed.append(f"{parameter} is estimated, before the measurements {mean:.3g} +- {spread:.3g} m2/kg")
-    for constant in EMPIRICAL:
-        if constant in open_:
-            roles[constant], values[constant] = "estimated", Gaussian(0.0, ACCELERATION**2)
-            assumed.append(f"{constant} is estimated, before the measurements 0 +- {ACCELERATION:g} m/s2")
+    for constant in accelerations:
+        roles[constant], values[constant] = "estimated", Gaussian(0.0, ACCELERATION**2)
+        assumed.append(f"{constant} is estimated, before the measurements 0 +- {ACCELERATION:g} m/s2")
     return roles, values, tuple(assumed)
 
 
