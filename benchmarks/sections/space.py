@@ -5,7 +5,6 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -179,7 +178,8 @@ def _less_gradient() -> Iterator[Figure]:
 
 def _nodes() -> Iterator[Figure]:
     """Tables of rotation, Sun and Moon made for an arc, nothing known before."""
-    recipes = replace(orbits.problem(20, True))._recipes
+    case = orbits.problem(20, True)
+    recipes = outside.recipes_of(case.model, case.functions, ())
     for name, (seconds, bound) in NODES.items():
 
         def make(seconds: float = seconds) -> None:

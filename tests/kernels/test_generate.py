@@ -10,8 +10,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
+from piazzi import kernels
 from piazzi.expressions import FUNCTIONS
-from piazzi.kernels import cache
+from piazzi.kernels import KernelSpec, cache
+from piazzi.kernels.build import compile_entries
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -123,3 +125,34 @@ def test_first_compilation_is_told_in_one_line(monkeypatch, caplog, tmp_path):
         folder.writable_folder.cache_clear()
     assert len(caplog.messages) == 1
     assert "compiling rates for x, y, once" in caplog.messages[0]
+
+
+OUTLINED = """
+@outlined
+def long_way(x):
+    return sin(x)*exp(cos(x) - sin(2.0*x)) + log(1.0 + x*x)
+
+
+@inline
+def many_times(x):
+    for _ in range(2):
+        x = {calls}
+    return x
+
+
+@entry
+def run_many(x: Array) -> None:
+    x[0] = many_times(x[0])
+"""
+
+
+def test_a_helper_that_is_outlined_is_compiled_once_whatever_calls_it():
+    """Numba lets what an inlined function calls be inlined too, unless that says otherwise."""
+    sizes = []
+    for count in (1, 40):
+        calls = "long_way(" * count + "x" + ")" * count
+        with kernels.fragment(f"called_{count}_times", OUTLINED.format(calls=calls)):
+            spec = KernelSpec(pz.Model(["x"], ["0"], discrete=True), kernels.Discrete().scheme, (f"called_{count}_times",))
+            objects, _ = compile_entries(spec.source("compiled"))
+        sizes.append(len(objects["run_many"]))
+    assert sizes[1] < 2 * sizes[0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -65,6 +65,11 @@ class Gravity:
     def field(self) -> GravityField:
         """The coefficients, as far as they go."""
         return self.model if isinstance(self.model, GravityField) else gravity_field(self.model)
+
+    @property
+    def exact(self) -> Gravity:
+        """The same whose gradient is that of its acceleration, which it is where the degrees are the same."""
+        return self if self.gradient_degree == self.degree else replace(self, gradient_degree=self.degree)
 
     @property
     def span(self) -> None:

@@ -15,6 +15,7 @@ from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.estimator import Estimate, Stopwatch, View
 from piazzi.estimate.factor_graph import FactorGraph
 from piazzi.estimate.gauss_newton import Outcome, optimize
+from piazzi.estimate.gradients import ended_exactly
 from piazzi.estimate.width import undetermined
 from piazzi.kernels.spec import FILLS_REGISTERS
 from piazzi.problem import Problem, Tracking
@@ -123,6 +124,7 @@ class BatchLeastSquares:
             raise ValueError(f"tolerance is {self.tolerance}; it must be positive")
 
     @with_considered
+    @ended_exactly(lambda near: near.details["first_state"])
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Means and covariances at every epoch; `success` is False where the iterations do not converge.
 
@@ -151,7 +153,9 @@ class BatchLeastSquares:
             watch.seconds(),
             "delayed",
             None,
-            outcome.details | {"start": used, "residuals": chain.residuals()} | _steps(noise_free, nodes),
+            outcome.details
+            | {"start": used, "first_state": chain.x[0].copy(), "residuals": chain.residuals()}
+            | _steps(noise_free, nodes),
             outcome.failure or undetermined(noise_free, outcome.covariance[0], chain.x),
         )
 

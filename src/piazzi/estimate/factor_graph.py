@@ -14,6 +14,7 @@ from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
 from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.estimator import Estimate, Stopwatch, View
 from piazzi.estimate.gauss_newton import Outcome
+from piazzi.estimate.gradients import ended_exactly
 from piazzi.estimate.joint_mode import applies, bias_message, marginal
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.losses import Cauchy, loss_of
@@ -99,6 +100,7 @@ class FactorGraph:
             raise ValueError(f"tolerance is {self.tolerance}; it must be positive")
 
     @with_considered
+    @ended_exactly(lambda near: near.mean)
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Smoothed means and covariances at every epoch; `success` is False where the iterations do not converge.
 

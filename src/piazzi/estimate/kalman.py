@@ -13,6 +13,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate, Stopwatch
+from piazzi.estimate.gradients import told_of
 from piazzi.estimate.guarded import Guard, GuardedLiveFilter, check_gate, guarded_run
 from piazzi.estimate.live import LiveFilter
 from piazzi.estimate.root import linear_root, root_estimate
@@ -81,6 +82,7 @@ class ExtendedKalmanFilter:
         return None if self.iterations == 1 and self.gate is None else Guard(int(self.iterations), self.gate)
 
     @with_considered
+    @told_of
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Filtered means and covariances at every epoch.
 

@@ -11,6 +11,7 @@ from piazzi import kernels
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate, Stopwatch, View
+from piazzi.estimate.gradients import told_of
 from piazzi.estimate.live_window import LiveWindow, window_opens
 from piazzi.estimate.losses import loss_of
 from piazzi.estimate.robust_window import loss_numbers, window_fragments
@@ -96,6 +97,7 @@ class SlidingWindow:
         return np.asarray(np.searchsorted(times, window_opens(times, self.lag_seconds)), dtype=np.int64)
 
     @with_considered
+    @told_of
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Real-time means and covariances at every epoch, with the delayed ones beside them.
 

@@ -12,6 +12,7 @@ from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import chain_fragments
 from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate, Stopwatch, View
+from piazzi.estimate.gradients import told_of
 from piazzi.estimate.soundness import check_start
 from piazzi.estimate.width import NOT_BORDERED, TOO_WIDE, too_wide, undetermined
 from piazzi.kernels.bundle import Chain, Innovations, Smoothed
@@ -41,6 +42,7 @@ class Smoother:
     cross_covariances: bool = False
 
     @with_considered
+    @told_of
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Smoothed means and covariances at every epoch; innovations are the filter's.
 

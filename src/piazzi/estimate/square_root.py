@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate
+from piazzi.estimate.gradients import told_of
 from piazzi.estimate.guarded import check_gate
 from piazzi.estimate.live_root import LiveRootFilter
 from piazzi.estimate.root import Root, linear_root, root_estimate
@@ -34,6 +35,7 @@ class SquareRootKalmanFilter:
         check_gate(self.gate)
 
     @with_considered
+    @told_of
     def estimate(self, problem: Problem, tracking: Tracking) -> Estimate:
         """Filtered means and covariances at every epoch.
 

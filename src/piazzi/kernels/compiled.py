@@ -69,7 +69,7 @@ def inline(function: Callable[..., Any]) -> Any:
 
 def outlined(function: Callable[..., Any]) -> Any:
     """Mark a helper that is large and called from several places: it is compiled once and called."""
-    return njit(**HELPER)(function)
+    return njit(forceinline=False, **HELPER)(function)  # said: what its callers are marked would hold for it too
 
 
 def entry(function: Callable[..., Any]) -> Any:

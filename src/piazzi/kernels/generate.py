@@ -65,7 +65,7 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
     if model.events:
         parts.append(_events_source(model))
     if model.looks_elsewhen:
-        parts.append(re.sub(r"\bsubstep", "elsewhen", runge_kutta_source(*DORMAND_PRINCE_8, rule=False)))
+        parts.append(re.sub(r"\bsubstep", "elsewhen", runge_kutta_source(*DORMAND_PRINCE_8, rule=False, long=model.reads_data)))
     parts.append(_sensor_source(model))
     return "".join(parts)
 
@@ -164,9 +164,11 @@ def _dynamics_source(model: Model) -> str:
 
     def rates_by(suffix: str, call: str) -> str:
         value, both = _unpack(rates, f"scalar_f({call})"), _unpack(rates + F.names, f"scalar_f_F({call})")
-        return _inline(f"dynamics{suffix}(t, x, p)", value, f"return {whole}") + _inline(
-            f"rhs{suffix}(t, x, R, p)", both, f"return {whole}, matrix({rows})"
-        )
+        source = _inline(f"dynamics{suffix}(t, x, p)", value, f"return {whole}")
+        source += _inline(f"rhs{suffix}(t, x, R, p)", both, f"return {whole}, matrix({rows})")
+        for name, given in (("dynamics", "t, x, p"), ("rhs", "t, x, R, p")) if model.reads_data else ():
+            source += _inline(f"{name}{suffix}_outlined({given})", f"return {name}{suffix}({given})", mark="outlined")
+        return source
 
     return (
         function("scalar_f", arguments, names, list(d.f), d.values, called)
@@ -179,7 +181,7 @@ def _dynamics_source(model: Model) -> str:
 def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
     source = _any_step_source(model, scheme)
     if model.events and scheme[0] != "kepler":
-        source = re.sub(r"\b(dynamics|rhs)\(", r"\1_beside(", source)
+        source = re.sub(r"\b(dynamics|rhs)(_outlined)?\(", r"\1_beside\2(", source)
         if "GAPS = " not in source:  # noise is integrated piece by piece
             source = rule_source(6) + source
         if scheme[0] == "adaptive":
@@ -213,9 +215,9 @@ def _events_source(model: Model) -> str:
 
 def _any_step_source(model: Model, scheme: tuple[Any, ...]) -> str:
     if scheme[0] == "runge-kutta":
-        return runge_kutta_source(*scheme[1])
+        return runge_kutta_source(*scheme[1], long=model.reads_data)
     if scheme[0] == "gauss-jackson":
-        return runge_kutta_source(*DORMAND_PRINCE_8) + multistep_source(model, *scheme[1:])
+        return runge_kutta_source(*DORMAND_PRINCE_8, long=model.reads_data) + multistep_source(model, *scheme[1:])
     if scheme[0] == "adaptive":
         return adaptive_source(model, *scheme[1:])
     if scheme[0] == "kepler":

@@ -26,17 +26,19 @@ def _combination(base: str, k: str, coefficients: Sequence[float], h: str = "*h"
     return " + ".join([base, *terms] if base else terms)
 
 
-def runge_kutta_source(a: Sequence[Row], weights: Row, nodes: Row, *, rule: bool = True) -> str:
+def runge_kutta_source(a: Sequence[Row], weights: Row, nodes: Row, *, rule: bool = True, long: bool = False) -> str:
     """The stages of an explicit tableau, on the state alone and on state and transition matrix together.
 
-    Many stages are compiled once and called: inlined wherever a step is taken, they would take minutes to compile.
+    Many stages are compiled once and called: inlined wherever a step is taken, they would take minutes to compile.  So are,
+    within them, rates that are `long`: twelve copies of many forces are more than a processor keeps at hand.
     """
     mark = "inline" if len(weights) <= MOST_INLINED else "outlined"
+    suffix = "_outlined" if long and mark == "outlined" else ""
     alone, both = [], []
     for i, (row, c) in enumerate(zip(a, nodes, strict=True)):
         t = f"t + {c!r}*h" if c else "t"
-        alone.append(f"k{i} = dynamics({t}, {_combination('x', 'k', row)}, p)")
-        both.append(f"k{i}, K{i} = rhs({t}, {_combination('x', 'k', row)}, {_combination('R', 'K', row)}, p)")
+        alone.append(f"k{i} = dynamics{suffix}({t}, {_combination('x', 'k', row)}, p)")
+        both.append(f"k{i}, K{i} = rhs{suffix}({t}, {_combination('x', 'k', row)}, {_combination('R', 'K', row)}, p)")
     alone.append(f"return {_combination('x', 'k', weights)}")
     both.append(f"return {_combination('x', 'k', weights)}, {_combination('R', 'K', weights)}")
     step, jacobian = "substep(t, h, x, p)", "substep_jacobian(t, h, x, R, p)"
@@ -47,11 +49,12 @@ def runge_kutta_source(a: Sequence[Row], weights: Row, nodes: Row, *, rule: bool
 def adaptive_source(model: Model, rtol: float, atol: float, max_steps: int) -> str:
     """``trial``, ``trial_jacobian``: a step of order 8 and its error in units of the tolerance, alone and with derivative."""
     a, weights, nodes = DORMAND_PRINCE_8
+    suffix = "_outlined" if model.reads_data else ""
     stages, both, error = [], [], []
     for i, (row, c) in enumerate(zip(a, nodes, strict=True)):
         t, x = f"t + {c!r}*h" if c else "t", _combination("x", "k", row)
-        stages.append(f"k{i} = dynamics({t}, {x}, p)")
-        both.append(f"k{i}, K{i} = rhs({t}, {x}, {_combination('R', 'K', row)}, p)")
+        stages.append(f"k{i} = dynamics{suffix}({t}, {x}, p)")
+        both.append(f"k{i}, K{i} = rhs{suffix}({t}, {x}, {_combination('R', 'K', row)}, p)")
     for v, k in (("y", "x"), ("S", "R")):
         (stages if v == "y" else both).append(f"{v} = {_combination(k, 'k' if v == 'y' else 'K', weights)}")
     both.append(stages[-1])

@@ -120,7 +120,17 @@ class Problem:
 
     def _lay_out(self) -> None:
         """Make the arrays now, so that no run has to."""
-        for name in ("mean", "covariance", "given", "narrowest", "considered", "is_correlated", "noise_fragment", "specs"):
+        for name in (
+            "mean",
+            "covariance",
+            "given",
+            "narrowest",
+            "considered",
+            "is_correlated",
+            "noise_fragment",
+            "specs",
+            "approximated",
+        ):
             getattr(self, name)
         for name in ("sensor", "noise", "correlated", "numbers"):
             getattr(self, f"station_{name}")
@@ -171,6 +181,17 @@ class Problem:
         """What the data of its functions from outside, and of its stations' places, are told apart by."""
         places = {f"station {s.name}": s.place for s in self.stations if s.place is not None}
         return {name: recipe.checksum for name, recipe in {**self.functions, **places}.items()}
+
+    @cached_property
+    def approximated(self) -> tuple[str, ...]:
+        """Names of the functions from outside whose derivatives are not quite those of their values."""
+        return tuple(name for name, recipe in self.functions.items() if outside.exact(recipe) is not recipe)
+
+    def with_exact_derivatives(self) -> Problem:
+        """The problem with the derivatives of its functions' values, for which nothing is compiled; else itself."""
+        if not self.approximated:
+            return self
+        return replace(self, functions={name: outside.exact(recipe) for name, recipe in self.functions.items()})
 
     @cached_property
     def prior_bundle(self) -> Belief:

@@ -108,7 +108,7 @@ def anomaly(r0, sigma0, beta, mu, dt):
     return mirror * anomaly_forward(r0, mirror * sigma0, beta, mu, fabs(dt))
 
 
-@outlined
+@inline
 def kepler_motion(r0, sigma0, v2, mu, dt):
     """F, G, F', G' after `dt` from distance `r0`, r . v = `sigma0` and squared speed `v2`."""
     beta = 2.0 * mu / r0 - v2
@@ -117,7 +117,7 @@ def kepler_motion(r0, sigma0, v2, mu, dt):
     return 1.0 - mu * U2 / r0, r0 * U1 + sigma0 * U2, -mu * U1 / (r * r0), 1.0 - mu * U2 / r
 
 
-@outlined
+@inline
 def kepler_partials(r0, sigma0, v2, mu, dt):
     """F, G, F', G', and the derivatives of each by (r0, sigma0, beta, mu)."""
     beta = 2.0 * mu / r0 - v2
