@@ -142,6 +142,9 @@ def _cross(name: str, u: Sequence[str], v: Sequence[str]) -> dict[str, str]:
     return {f"{name}_{a}": f"{u[i]}*{v[j]} - {u[j]}*{v[i]}" for a, (i, j) in pairs}
 
 
+SHADOW_EDGES = {"sunlit": "shadow - disc", "half_lit": "shadow + disc"}  # positive in full light, and where some is left
+
+
 def radiation(shadows: Sequence[str]) -> Force:
     """Sunlight on a sphere, `cr_a_m` its coefficient times area over mass, with the shadows of the Earth and the Moon.
 

@@ -56,6 +56,7 @@ class Forces:
     about : "earth" or "sun"
     nongravitational : any of "A1", "A2", "A3" (m/s2 at one astronomical unit), about the Sun
     asteroids : those that draw the body, about the Sun; they need a kernel of their own
+    shadow_edges : whether steps end where the Earth's half-shadow begins and ends, as events of the model
 
     Raises
     ------
@@ -77,6 +78,7 @@ class Forces:
     about: Literal["earth", "sun"] = "earth"
     nongravitational: Sequence[str] = ()
     asteroids: Sequence[str] = ()
+    shadow_edges: bool = False
 
     def __post_init__(self) -> None:
         for name in options(self.about):
@@ -134,7 +136,13 @@ class Forces:
             text |= force_text.body_place(name)
         for part in self.parts:
             text |= part.definitions
-        return text
+        return text | (force_text.SHADOW_EDGES if self.events else {})
+
+    @property
+    def events(self) -> dict[str, str]:
+        """Names of events, with the definitions whose zeros they are."""
+        wanted = self.shadow_edges and self.radiation and "earth" in self.shadows
+        return {name: name for name in force_text.SHADOW_EDGES} if wanted else {}
 
     @cached_property
     def dynamics(self) -> dict[str, str]:
@@ -196,6 +204,7 @@ class Forces:
                 raise ValueError(f"added has {state!r}, which is not a state{nearest(state, dynamics)}")
             dynamics[state] += f" + ({text})"
         texts = [*dynamics.values(), *map(str, (definitions or {}).values()), *(n for s in seen for n in s.free_names)]
+        texts += self.events
         return Model(
             STATES,
             dynamics,
@@ -205,6 +214,7 @@ class Forces:
             _UNITS,
             definitions={**used_definitions(self.definitions, texts), **(definitions or {})},
             functions={**self._functions(_ANY), **called, **(functions or {})},
+            events=self.events,
         )
 
     def functions(

@@ -63,6 +63,7 @@ def _model(out: Physics, parameters: list[Parameter], sensors: list[Sensor], lab
     dynamics, definitions, functions = out.dynamics, out.definitions, dict(out.functions)
     if out.forces is not None:
         dynamics = dynamics_of(out.forces, dynamics)
+        out.events = {**out.forces.forces.events, **out.events}
         seen = [*(name for sensor in sensors for name in sensor.free_names), *out.events.values()]
         texts = [*dynamics.values(), *definitions.values(), *_texts(out.roots), *seen]
         definitions = definitions_of(out.forces, definitions, texts)
