@@ -4,6 +4,7 @@ import pytest
 
 import piazzi as pz
 from piazzi.cli.main import main
+from piazzi.present.equations import equations
 from piazzi.scenarios.loader import load_scenario
 from piazzi.scenarios.table import ScenarioError
 from piazzi.scenarios.write import problem_from_tables, problem_to_tables
@@ -101,6 +102,7 @@ def test_a_scenario_names_events_and_keeps_them(tmp_path):
     assert problem.model.events == (("wall", "edge"),)
     again = problem_from_tables(problem_to_tables(problem), "walls", "a test")
     assert again.model == problem.model
+    assert "# steps end where\nedge = 0    # wall" in equations(problem)
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,8 @@ def _lines(problem: Problem) -> Iterator[str]:
         left = f"{state}[k+1]" if model.discrete else f"d{state}/dt"
         unit = model.unit(state)
         yield f"{left} = {text}" + (f"    # {state} in {unit}" if unit else "")
+    if model.events:
+        yield from ("", "# steps end where", *(f"{definition} = 0    # {event}" for event, definition in model.events))
     if model.parameters:
         yield from ("", "# numbers")
         yield from (_number(problem, parameter) for parameter in model.parameters)

@@ -25,7 +25,7 @@ def propagate_arc(t, dt, count, x, p):
                 x = y if s == 1.0 else substep(t + at, s * h, x, own)
                 at += s * h
                 cross(t + at, x, e, own)
-            if last and (e < 0 or s == 1.0):
+            if last and (e < 0 or fabs(dt - at) <= 1e-15 * fabs(dt)):
                 return x
         h = resized(h, error, widest)
         if fabs(h) <= 1e-15 * fabs(dt):
@@ -57,7 +57,7 @@ def propagate_arc_jacobian(t, dt, count, x, R, p):
                 at += s * h
                 jump, row = cross(t + at, y, e, own)
                 x, R = y, jumped(S, jump, row @ complete(S))
-            if last and (e < 0 or s == 1.0):
+            if last and (e < 0 or fabs(dt - at) <= 1e-15 * fabs(dt)):
                 return x, R
         h = resized(h, error, widest)
         if fabs(h) <= 1e-15 * fabs(dt):

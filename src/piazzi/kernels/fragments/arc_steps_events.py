@@ -17,7 +17,7 @@ def cut_step(t, h, x, p):
         x = y if s == 1.0 else substep(t + done, s * left, x, p)
         done += s * left
         cross(t + done, x, e, p)
-        if s == 1.0:
+        if fabs(h - done) <= 1e-15 * fabs(h):
             return x
     return nan * x
 
@@ -38,7 +38,7 @@ def cut_step_jacobian(t, h, x, R, p):
         done += s * left
         jump, row = cross(t + done, y, e, p)
         x, R = y, jumped(S, jump, row @ complete(S))
-        if s == 1.0:
+        if fabs(h - done) <= 1e-15 * fabs(h):
             return x, R
     return nan * x, nan * R
 

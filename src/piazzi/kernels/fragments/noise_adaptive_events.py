@@ -31,7 +31,7 @@ def propagate_arc_noise(t, dt, count, x, R, p, Q, scale):
                 x, R = y, jumped(S, jump, row @ complete(S))
                 G = complete(jumped(identity_rows(), jump, row))
                 Q_step = G @ Q_step @ G.T
-            if last and (e < 0 or s == 1.0):
+            if last and (e < 0 or fabs(dt - at) <= 1e-15 * fabs(dt)):
                 return x, complete(R), symmetric(Q_step)
         h = resized(h, error, widest)
         if fabs(h) <= 1e-15 * fabs(dt):

@@ -25,7 +25,7 @@ def cut_step_noise(t, h, x, R, p, Q, Q_step):
         x, R = y, jumped(S, jump, row @ complete(S))
         G = complete(jumped(identity_rows(), jump, row))
         Q_step = G @ Q_step @ G.T
-        if s == 1.0:
+        if fabs(h - done) <= 1e-15 * fabs(h):
             return x, R, Q_step
     return nan * x, nan * R, nan * Q_step
 
