@@ -103,7 +103,7 @@ def located(e, t, h, x, p, high):
             high = s
         step = value / rate if rate < 0.0 else inf
         after = s - step if low <= s - step <= high else 0.5 * (low + high)
-        if fabs(after - s) <= 1e-12:
+        if fabs(after - s) <= 1e-7:  # whose square is left
             return after
         s = after
     return s
