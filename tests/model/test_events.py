@@ -125,3 +125,39 @@ def test_the_program_ends_with_2(tmp_path, capsys):
     path.write_text(SCENARIO.replace('wall = "edge"', 'wall = "egde"'))
     assert main(["scenarios", "check", str(path)]) == 2
     assert "event 'wall' names 'egde'" in "".join(capsys.readouterr())
+
+
+EARTH = """title = "Sunlight in low orbit"
+epoch = "2016-02-13T16:00:00 UTC"
+[earth]
+degree = 4
+radiation = "cannonball"
+shadow_edges = true
+[parameters]
+cr_a_m = 0.02
+[sensors.place.components]
+px = "x"
+[[stations]]
+name = "a"
+sensor = "place"
+noise = { sigma = 1.0 }
+[prior]
+mean = [7e6, 0, 0, 0, 5e3, 5e3]
+sigma = [1, 1, 1, 1, 1, 1]
+[process_noise]
+variance = [0, 0, 0, 0, 0, 0]
+per = "second"
+[integrator]
+method = "rk8"
+[times]
+step = 60
+count = 10
+"""
+
+
+def test_the_section_earth_brings_events(tmp_path):
+    path = tmp_path / "leo.toml"
+    path.write_text(EARTH)
+    assert load_scenario(path).problem.model.events == (("sunlit", "sunlit"), ("half_lit", "half_lit"))
+    path.write_text(EARTH + '[events]\nhalf_way = "shadow"\n')
+    assert ("half_way", "shadow") in load_scenario(path).problem.model.events
