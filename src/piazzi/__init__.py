@@ -72,8 +72,8 @@ if TYPE_CHECKING:
         Tracking,
         Truth,
         passes,
-        with_gauss_markov,
     )
+    from piazzi.problem.gauss_markov import with_gauss_markov
     from piazzi.simulation import simulate
     from piazzi.study import Study, read_store
 
@@ -86,8 +86,8 @@ _WHERE = {
         "Kepler Midpoint Ralston RungeKutta RungeKutta4 RungeKutta8 Taylor",
         "piazzi.earth": "Epoch",
         "piazzi.formats": "Ephemeris Observations read_ephemeris read_tracking",
-        "piazzi.problem": "Gaussian Manoeuvre Pass Problem ProcessNoise Schedule Station Tracking Truth passes "
-        "with_gauss_markov",
+        "piazzi.problem": "Gaussian Manoeuvre Pass Problem ProcessNoise Schedule Station Tracking Truth passes",
+        "piazzi.problem.gauss_markov": "with_gauss_markov",
         "piazzi.orbit": "difference kepler_transition propagate_kepler",
         "piazzi.simulation": "simulate",
         "piazzi.estimate.bank": "Bank",

@@ -13,7 +13,6 @@ import numpy as np
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.inputs import prepare
 from piazzi.scenarios import Recording, load_scenario, names
-from piazzi.simulation import simulate
 
 KINDS = (".npz", ".nc", ".csv", ".toml")
 
@@ -109,4 +108,6 @@ def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, said:
     if kind != ".toml" and os.path.isfile(text):
         raise ValueError(f"{text}: files end in {', '.join(KINDS)}, not {kind!r}")
     found = load_scenario(text)
+    from piazzi.simulation import simulate
+
     return found.problem, simulate(found.problem, found.times, np.random.default_rng(seed))

@@ -10,8 +10,7 @@ from piazzi.determination.setup import Setup
 from piazzi.estimate.batch import undisturbed
 from piazzi.evaluate.information import NEGLIGIBLE, along, factor, predicted
 from piazzi.problem.checks import Array
-from piazzi.problem.inputs import prepare
-from piazzi.simulation import wrapped
+from piazzi.problem.inputs import prepare, wrapped
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from piazzi.earth.rotation import rotation
 from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, RATE, Rows
 from piazzi.problem import Problem, Station, Tracking
 from piazzi.problem.checks import Array
-from piazzi.simulation import wrapped
+from piazzi.problem.inputs import wrapped
 
 FAR = 1e7  # m: where a body is put to ask a sensor what it adds
 PLACES = (("position_x", "position_y", "position_z"), ("px", "py", "pz"))

@@ -12,7 +12,7 @@ import numpy as np
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.forecast import STEP, moved
 from piazzi.problem import Problem, Tracking
-from piazzi.simulation import wrapped
+from piazzi.problem.inputs import wrapped
 
 JUMP = 1.0  # standard deviations of the estimate that a parameter's small change may bend it by
 _Estimator = TypeVar("_Estimator")

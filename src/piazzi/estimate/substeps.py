@@ -13,7 +13,6 @@ from piazzi.kernels.bundle import Beliefs
 from piazzi.problem import Problem, ProcessNoise, Tracking, Truth
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import prepare
-from piazzi.simulation import simulate, true_problem
 
 FINER = 4  # times as many substeps stand for the truth: even at order 1 that leaves a quarter of the error unseen
 MOST = 2**20
@@ -92,6 +91,8 @@ def _undisturbed(problem: Problem, times: Any) -> Tracking:
     fixed = {c: problem.parameters[c].mean[0] for c in problem.model.constants}
     exact = [replace(m, covariance=None) for m in problem.manoeuvres]
     truth = Truth(problem.mean[: len(problem.model.states)], fixed, calm, measurement_noise=False, manoeuvres=exact)
+    from piazzi.simulation import simulate
+
     return simulate(replace(problem, truth=truth), times, np.random.default_rng(0))
 
 
@@ -110,6 +111,8 @@ def choose_substeps(problem: Problem, times: Any, tolerance: float = 0.01) -> Pr
         raise ValueError(f"tolerance is {tolerance}; it must be positive, in standard deviations")
     chosen = _chosen(problem, times, tolerance)
     if problem.truth is not None and problem.truth.integrator is not None:
+        from piazzi.simulation import true_problem
+
         actual = _chosen(true_problem(problem), times, tolerance)
         chosen = replace(chosen, truth=replace(problem.truth, integrator=actual.integrator))
     return chosen

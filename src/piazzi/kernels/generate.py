@@ -24,12 +24,12 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from piazzi.kernels.multistep import multistep_source
-from piazzi.kernels.outside import outside_source
 from piazzi.kernels.printer import function, in_time
 from piazzi.kernels.quadrature import rule_source
 from piazzi.kernels.steps import adaptive_source, axes_source, kepler_source, runge_kutta_source
 from piazzi.kernels.steps import inline_source as _inline
 from piazzi.kernels.tableaus import DORMAND_PRINCE_8
+from piazzi.kernels.tables import outside_source
 from piazzi.model import Model, Sensor
 from piazzi.model.derivation import constant_acceleration_step, derive, derive_events, derive_sensor
 

@@ -71,6 +71,11 @@ class KernelSpec:
         return head + bundles + functions + text
 
 
+def outside_fragments(model: Model) -> tuple[str, ...]:
+    """Names of the package's fragments that the functions need."""
+    return tuple(dict.fromkeys(s.fragment for s in model.signatures if not s.terms and not s.code))
+
+
 @cache
 def machine_lanes() -> int:
     """Lanes that suit this machine: PIAZZI_LANES if set, else the doubles that one of its registers holds."""

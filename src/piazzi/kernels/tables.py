@@ -7,6 +7,8 @@ columns (padded to a register), in tau = -1 to 1.  Outside of the table values a
 
 from __future__ import annotations
 
+from piazzi.model import Model
+
 _LOOK_UP = """@outlined
 def {name}_of_one(t, data, at):
     if not data[at] <= t <= data[at + 5]:
@@ -50,3 +52,10 @@ def table_source(columns: int, terms: int) -> str:
             (f"{name}_partials", "\n    v = 0.0 * u", partials, values + rates),
         )
     )
+
+
+def outside_source(model: Model) -> str:
+    """Source of tables, and of the user's own fragments."""
+    tables = {(9 if s.kind == "rotation" else s.outputs, s.terms): None for s in model.signatures if s.terms}
+    own = dict.fromkeys(s.code for s in model.signatures if s.code)
+    return "".join(table_source(columns, terms) for columns, terms in tables) + "".join(f"{code}\n\n\n" for code in own)

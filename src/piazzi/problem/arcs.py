@@ -9,7 +9,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.kernels import Integrator, KernelSpec
 from piazzi.kernels.bundle import Given
-from piazzi.kernels.outside import outside_fragments
+from piazzi.kernels.spec import outside_fragments
 from piazzi.model import Model
 from piazzi.problem.checks import Array
 from piazzi.problem.evaluation import cut_at_events

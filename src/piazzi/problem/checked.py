@@ -17,7 +17,6 @@ from piazzi.model.functions import STATION_TABLE
 from piazzi.problem import outside
 from piazzi.problem.checks import covariance, finite_vector, frozen, numeric
 from piazzi.problem.parts import Gaussian, ProcessNoise, Station
-from piazzi.problem.two_body import check_orbit_axes
 from piazzi.text import nearest, suggest
 
 
@@ -39,6 +38,8 @@ def process_noise(given: Any, model: Model) -> ProcessNoise:
     full = np.zeros((len(names), len(names)))
     full[: len(matrix), : len(matrix)] = matrix
     if noise.axes == "orbit":
+        from piazzi.problem.two_body import check_orbit_axes
+
         check_orbit_axes(model)
     return replace(noise, covariance=frozen(full))
 

@@ -132,3 +132,12 @@ def with_prior_node(inputs: Inputs) -> Inputs:
         scale=np.append(0.0, inputs.scale),
         first_row=np.append(np.int64(0), inputs.first_row),
     )
+
+
+def wrapped(problem: Problem, row_station: Array, z: Array) -> Array:
+    """Angle components brought into (-pi, pi]."""
+    angle = np.zeros((len(problem.stations), z.shape[1]), dtype=bool)
+    for s, station in enumerate(problem.stations):
+        marks = problem.model.sensor(station.sensor).is_angle
+        angle[s, : len(marks)] = marks
+    return np.where(angle[row_station], z - 2 * np.pi * np.ceil((z - np.pi) / (2 * np.pi)), z)

@@ -12,7 +12,7 @@ import numpy as np
 
 from piazzi.kernels import Integrator, Kepler, KernelSpec, RungeKutta8
 from piazzi.kernels.bundle import Belief, Given
-from piazzi.kernels.outside import outside_fragments
+from piazzi.kernels.spec import outside_fragments
 from piazzi.model import Model
 from piazzi.problem import checked, evaluation, layout, manoeuvres, outside
 from piazzi.problem.arcs import Arc, Steps, arc
@@ -20,8 +20,6 @@ from piazzi.problem.checks import Array, check_span, finite_vector, lock, numeri
 from piazzi.problem.constants import with_station_constants
 from piazzi.problem.epochs import check_near, epoch_given
 from piazzi.problem.parts import Gaussian, Manoeuvre, Station, Truth
-from piazzi.problem.stepping import chosen_steps
-from piazzi.problem.two_body import check_two_body
 from piazzi.text import nearest
 
 
@@ -91,6 +89,8 @@ class Problem:
         self._check_regular()
         self._lay_out()
         if isinstance(self.integrator, Kepler):
+            from piazzi.problem.two_body import check_two_body
+
             check_two_body(self.model, self.integrator, self._values())
 
     def __getstate__(self) -> dict[str, Any]:
@@ -341,6 +341,8 @@ class Problem:
 
     def steps(self, start: float, end: float, first: Array | None = None) -> Steps:
         """The longest steps over a span of times, from a state at its start, the prior mean where none is given."""
+        from piazzi.problem.stepping import chosen_steps
+
         if first is not None:
             return chosen_steps(self, first, start, end)
         if (start, end) not in self._steps:

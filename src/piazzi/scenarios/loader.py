@@ -16,7 +16,7 @@ import numpy as np
 from piazzi.kernels import RungeKutta8
 from piazzi.model import Model
 from piazzi.opening import opened
-from piazzi.problem import Problem, with_gauss_markov
+from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.epochs import epoch_given
 from piazzi.problem.gaps import is_restricted
@@ -219,7 +219,11 @@ def read_problem(file: Table, name: str, units: Units, start: float | None = Non
         with file.faults.at("truth"):
             true_problem(problem)
         with file.faults.at("gauss_markov"):
-            return problem if gauss_markov is None else with_gauss_markov(problem, **gauss_markov)
+            if gauss_markov is not None:
+                from piazzi.problem.gauss_markov import with_gauss_markov
+
+                problem = with_gauss_markov(problem, **gauss_markov)
+            return problem
     return None
 
 

@@ -12,7 +12,7 @@ from piazzi.problem import Problem, Tracking, Truth
 from piazzi.problem.arcs import arc
 from piazzi.problem.checks import Array, check_span, finite_vector, numeric
 from piazzi.problem.gaps import is_restricted
-from piazzi.problem.inputs import Inputs
+from piazzi.problem.inputs import Inputs, wrapped
 from piazzi.problem.truth import true_problem
 from piazzi.simulation.rule import MOST_DRAWS, NoTruthError, Rule
 from piazzi.simulation.visibility import rules, seen
@@ -186,12 +186,3 @@ def on_sky(problem: Problem, row_station: Array, z: Array) -> Array:
             if partner is not None:
                 out[row_station == s, i] = np.cos(z[row_station == s, partner])
     return out
-
-
-def wrapped(problem: Problem, row_station: Array, z: Array) -> Array:
-    """Angle components brought into (-pi, pi]."""
-    angle = np.zeros((len(problem.stations), z.shape[1]), dtype=bool)
-    for s, station in enumerate(problem.stations):
-        marks = problem.model.sensor(station.sensor).is_angle
-        angle[s, : len(marks)] = marks
-    return np.where(angle[row_station], z - 2 * np.pi * np.ceil((z - np.pi) / (2 * np.pi)), z)
