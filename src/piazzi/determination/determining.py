@@ -14,10 +14,11 @@ from piazzi.determination.analysis import Analysis, analysed
 from piazzi.determination.approach import approached
 from piazzi.determination.fit import estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
-from piazzi.determination.orbit_forces import chosen_forces
+from piazzi.determination.orbit_forces import Chosen, chosen_forces
 from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object
-from piazzi.determination.setup import Setup, setup
+from piazzi.determination.setup import Setup, posed, setup
+from piazzi.determination.unguided import unguided
 from piazzi.determination.unknowns import considered, estimated
 from piazzi.determination.verdict import verdict
 from piazzi.earth import Epoch
@@ -54,7 +55,7 @@ def determine(
     tracking : files, or `Observations`, put together
     guess : where to begin: text, ``"a=7078km e=0.001 i=98.2deg raan=10deg argp=0deg nu=0deg epoch=2026-11-03T04:12:00Z"``
         or ``"x=7000km ... vz=7.5km/s epoch=..."``; a file (OEM, OPM, TLE, OMM, SP3, CPF, an earlier determination's JSON); a
-        `Guess`.  Fixes of position need none.
+        `Guess`.  None, or "none": all orbits that fit are looked for.
     stations : files, `earth.Station` objects or a `StationList`; "ilrs" are those of the package
     with_ : estimators, as the command line writes them; the first is the answer.  Default the graph.
     forces : "default" (by height), "none", text such as ``"gravity=EGM2008 degree=40 drag=exponential"``, or `earth.Forces`
@@ -107,9 +108,13 @@ def prepared(
     told = dict(conventions) | ({"frame": frame} if frame else {})
     rows = of_object(_observations(tracking, told), object)
     seen = measured(rows, stations, com=com, corrected=told.get("corrections") == "applied")
-    begin = _guess(guess, seen, object)
-    found = chosen_forces(forces, begin.state, name=seen.object, mass=mass, area=area)
-    return setup(seen, considered(estimated(found, estimate, seen), consider, seen), begin, at=at)
+
+    def chosen(orbit: Guess) -> Chosen:
+        found = chosen_forces(forces, orbit.state, name=seen.object, mass=mass, area=area)
+        return considered(estimated(found, estimate, seen), consider, seen)
+
+    begin = _guess(guess, seen, object) or unguided(seen, lambda first: posed(seen, chosen(first), first))
+    return setup(seen, chosen(begin), begin, at=at)
 
 
 def objects_in(tracking: Sequence[Any], frame: str | None, told: Mapping[str, Any]) -> list[str | None]:
@@ -169,16 +174,13 @@ def _instant(epoch: Any) -> tuple[str, Epoch | None]:
     return scale, Epoch(epoch)
 
 
-def _guess(given: Any, seen: Measured, chosen: str | None) -> Guess:
-    """The user's, or what fixes give by themselves."""
-    if given is not None:
+def _guess(given: Any, seen: Measured, chosen: str | None) -> Guess | None:
+    """The user's, or what fixes give by themselves; None where there is neither."""
+    if given is not None and given != "none":
         return guess_of(given, seen.first, chosen or seen.object or None)
     wide = {s.name for s in seen.stations if s.sensor in ("position", "position_velocity")}
     own = np.isin(seen.tracking.row_stations, list(wide)) & np.isfinite(seen.tracking.values[:, :3]).all(axis=1) if wide else []
-    found = from_fixes(seen.epoch, seen.tracking.row_times[own], seen.tracking.values[own, :3]) if np.any(own) else None
-    if found is None:
-        raise ValueError("these measurements give no orbit to begin from: say one with --guess, as elements, a state or a file")
-    return found
+    return from_fixes(seen.epoch, seen.tracking.row_times[own], seen.tracking.values[own, :3]) if np.any(own) else None
 
 
 def plain_command(words: Sequence[str]) -> str:

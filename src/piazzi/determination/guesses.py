@@ -36,7 +36,7 @@ NEAREST, FARTHEST = 1e6, 2e9  # m: distances from the centre that an orbit of th
 class Guess:
     """A state to begin from: position (3,) m and velocity (3,) m/s on the axes of the GCRF at an instant.
 
-    `source` says where it came from, `assumed` what was taken where nothing was said.
+    `source` says where it came from, `assumed` what was taken where nothing was said, `orbits` what else fits.
     """
 
     epoch: Epoch
@@ -44,6 +44,7 @@ class Guess:
     velocity: Array
     source: str
     assumed: tuple[str, ...] = ()
+    orbits: Any = None
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity"):

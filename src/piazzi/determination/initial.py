@@ -99,7 +99,7 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region = EARTH)
     if problem.model.states[:6] != ("x", "y", "z", "vx", "vy", "vz") or problem.epoch is None:
         raise ValueError("initial orbits need a problem with states x, y, z, vx, vy, vz and an epoch")
     rows, index = rows_of(problem, tracking)
-    first = _stretch(rows, STRETCH)
+    first = first_stretch(rows, STRETCH)
     search = two_body_modes(rows.of(first), region)
     if not search.modes:
         raise ValueError(f"no orbit fits the {len(np.unique(index[first]))} rows of the first stretch ({search.starts} starts)")
@@ -111,7 +111,7 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region = EARTH)
     return InitialOrbits(modes, search.starts, search.fits, apart)
 
 
-def _stretch(rows: Rows, length: float) -> Array:
+def first_stretch(rows: Rows, length: float) -> Array:
     """Indices of the stretch of so many seconds that holds most rows, the earliest of equals; longer where it holds too few."""
     order = np.argsort(rows.t, kind="stable")
     t = rows.t[order]

@@ -12,9 +12,9 @@ import numpy as np
 from piazzi.determination.analysis import Analysis
 from piazzi.determination.beliefs import beliefs
 from piazzi.determination.orbit import Orbit
-from piazzi.determination.setup import Setup
+from piazzi.determination.setup import Setup, carried
 from piazzi.determination.verdict import DECISIVE, Sentence
-from piazzi.earth import Epoch
+from piazzi.earth import Epoch, transform
 from piazzi.estimate.estimator import Estimate
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
@@ -106,9 +106,17 @@ class Determination:
 
     @property
     def modes(self) -> tuple[dict[str, Any], ...]:
-        """Orbits that fit, the most probable first: this one."""
-        state = self.orbit.at()
-        return ({"probability": 1.0, "mean": state.tolist(), "weighted_rms": self.weighted_rms},)
+        """Orbits that fit, the most probable first, at the epoch of the answer, which is this one."""
+        orbits = self.setup.guess.orbits
+        modes = () if orbits is None else orbits.modes
+        first = modes[0].probability if modes else 1.0
+        found = [{"probability": first, "mean": self.orbit.at().tolist(), "weighted_rms": self.weighted_rms}]
+        for mode in modes[1:]:
+            mean = carried(self.setup, mode.epoch, mode.mean)
+            r, v = transform(mean[:3], mean[3:], "GCRF", self.frame, self.epoch)
+            mean = np.concatenate([r, np.asarray(v)])
+            found.append({"probability": mode.probability, "mean": mean.tolist(), "weighted_rms": mode.weighted_rms})
+        return tuple(found)
 
     @property
     def weighted_rms(self) -> float | None:

@@ -66,7 +66,7 @@ def setup(
     ValueError
         Where they do not fit, or the guess cannot be followed to the measurements.
     """
-    problem = _problem(measured, chosen, guess, roles or {}, values or {})
+    problem = posed(measured, chosen, guess, roles, values)
     tracking, rows, solution = _with_epoch(measured, at)
     times = tracking.times
     begun = guess.epoch - measured.epoch
@@ -84,10 +84,17 @@ def with_prior(given: Setup, states: Array, covariance: Array) -> Setup:
     return replace(given, problem=replace(given.problem, prior=prior), states=states)
 
 
-def _problem(measured: Measured, chosen: Chosen, guess: Guess, roles: Mapping[str, str], values: Mapping[str, Any]) -> Problem:
+def posed(
+    measured: Measured,
+    chosen: Chosen,
+    guess: Guess,
+    roles: Mapping[str, str] | None = None,
+    values: Mapping[str, Any] | None = None,
+) -> Problem:
+    """The problem, with its prior at the guess."""
     own = {name: role for name, (role, _) in measured.parameters.items()}
-    every = {**chosen.roles, **own, **roles}
-    numbers = {**chosen.values, **{name: value for name, (_, value) in measured.parameters.items()}, **values}
+    every = {**chosen.roles, **own, **(roles or {})}
+    numbers = {**chosen.values, **{name: value for name, (_, value) in measured.parameters.items()}, **(values or {})}
     model = chosen.forces.model(measured.sensors, every, functions=measured.functions)
     return Problem(
         model,
@@ -139,6 +146,14 @@ def _followed(problem: Problem, begun: float, times: Array, step: float) -> Arra
         nodes = np.linspace(begun, float(times[0]), max(ceil(abs(gap) / step), 1) + 1)
         first = follow(problem, nodes, first, step)[0][-1]
     return follow(problem, times, first, step)[0]
+
+
+def carried(given: Setup, epoch: Epoch, state: Array) -> Array:
+    """State (6,) of another orbit of the same forces, from an epoch to that of the answer, on the axes of the GCRF."""
+    begun, end = epoch - given.measured.epoch, float(given.tracking.times[given.solution])
+    nodes = np.linspace(begun, end, max(ceil(abs(end - begun) / given.chosen.max_step), 1) + 1)
+    first = np.concatenate([state, given.problem.mean[6:]])
+    return follow(given.problem, nodes, first, given.chosen.max_step)[0][-1, :6]
 
 
 def follow(problem: Problem, times: Array, first: Array, step: float) -> tuple[Array, Array]:

@@ -23,8 +23,15 @@ PAIRS = (("azimuth", "elevation"), ("right_ascension", "declination"))
 ROUNDS = 3
 
 
-def rows_of(problem: Problem, tracking: Tracking, most: int = 600) -> tuple[Rows, Array]:
+def rows_of(problem: Any, tracking: Tracking, most: int = 600, *, ask: bool = True) -> tuple[Rows, Array]:
     """At most so many rows of each station as vectors, and for each the row of the tracking.
+
+    Parameters
+    ----------
+    problem : with sensors, stations and an epoch
+    tracking : of the problem
+    most : rows of a station
+    ask : whether sensors are asked what they add, for which the problem has to be whole; else it is left in
 
     Raises
     ------
@@ -39,7 +46,7 @@ def rows_of(problem: Problem, tracking: Tracking, most: int = 600) -> tuple[Rows
         if len(own) > most:
             own = own[np.unique(np.linspace(0, len(own) - 1, most).astype(int))]
         if len(own):
-            found += _of_station(problem, station, t[own], z[own], own)
+            found += _of_station(problem, station, t[own], z[own], own, ask)
     if not found:
         sensors = ", ".join(s.name for s in problem.model.sensors)
         raise ValueError(
@@ -51,7 +58,7 @@ def rows_of(problem: Problem, tracking: Tracking, most: int = 600) -> tuple[Rows
     return joined, np.concatenate([j for _, j in found])
 
 
-def _of_station(problem: Problem, station: Station, t: Array, z: Array, own: Array) -> list[tuple[Rows, Array]]:
+def _of_station(problem: Any, station: Station, t: Array, z: Array, own: Array, ask: bool) -> list[tuple[Rows, Array]]:
     sensor = next(s for s in problem.model.sensors if s.name == station.sensor)
     at = {name: i for i, name in enumerate(sensor.components)}
     noise = np.asarray(station.noise)
@@ -59,13 +66,13 @@ def _of_station(problem: Problem, station: Station, t: Array, z: Array, own: Arr
     sigma = np.sqrt(variance)
     for place in PLACES:
         if set(place) <= set(at):
-            return _fixes(problem, station, t, z, own, [at[p] for p in place], sigma)
+            return _fixes(problem, station, t, z, own, [at[p] for p in place], sigma, ask)
     if station.place is None:
         return []
     stands, velocity = observers(problem, station, t)
     out: list[tuple[Rows, Array]] = []
     pair = next((p for p in PAIRS if set(p) <= set(at)), None)
-    u = _directions(problem, station, t, z, stands, pair, [at[p] for p in pair]) if pair else None
+    u = _directions(problem, station, t, z, stands, pair, [at[p] for p in pair], ask) if pair else None
     if u is not None and pair is not None:
         i, j = (at[p] for p in pair)
         east, _ = _frame(u, _pole(problem, station, t, pair), pair)
@@ -77,7 +84,8 @@ def _of_station(problem: Problem, station: Station, t: Array, z: Array, own: Arr
         along = up if u is None else np.where(np.isfinite(u).all(axis=1, keepdims=True), u, up)
         i = at["range"]
         state = _states(problem, stands + z[:, i : i + 1] * along)
-        with np.errstate(invalid="ignore"):
+        added = np.zeros(len(t))
+        if ask:
             added = problem.measure(station.name, np.nan_to_num(state), t)[:, i] - z[:, i]
         value = np.zeros((len(t), 3))
         value[:, 0] = z[:, i] - np.where(np.abs(added) < 1e3, added, 0.0)
@@ -100,17 +108,19 @@ def _rows(
 
 
 def _fixes(
-    problem: Problem, station: Station, t: Array, z: Array, own: Array, at: list[int], sigma: Array
+    problem: Problem, station: Station, t: Array, z: Array, own: Array, at: list[int], sigma: Array, ask: bool
 ) -> list[tuple[Rows, Array]]:
     """Positions on the axes of the problem: what the sensor makes of a body at the centre plus what was measured, undone."""
     keep = np.isfinite(z[:, at]).all(axis=1)
     if not keep.any():
         return []
     t, z, own = t[keep], z[keep], own[keep]
+    nothing = np.zeros((len(t), 3))
+    if not ask:
+        return [_rows(POSITION, t, nothing, nothing, z[:, at], np.full((len(t), 2), float(np.max(sigma[at]))), own)]
     columns = [problem.measure(station.name, _states(problem, np.tile(FAR * e, (len(t), 1))), t)[:, at] for e in np.eye(3)]
     turn = np.stack(columns, axis=-1) / FAR
     value = np.linalg.solve(turn, z[:, at][..., None])[..., 0]
-    nothing = np.zeros((len(t), 3))
     return [_rows(POSITION, t, nothing, nothing, value, np.full((len(t), 2), float(np.max(sigma[at]))), own)]
 
 
@@ -123,7 +133,7 @@ def observers(problem: Problem, station: Station, t: Array) -> tuple[Array, Arra
 
 
 def _directions(
-    problem: Problem, station: Station, t: Array, z: Array, place: Array, pair: tuple[str, str], at: list[int]
+    problem: Problem, station: Station, t: Array, z: Array, place: Array, pair: tuple[str, str], at: list[int], ask: bool
 ) -> Array:
     """Unit vectors (K, 3) along which the sensor measures what was measured; NaN where nothing was."""
     good = np.isfinite(z[:, at]).all(axis=1)
@@ -137,7 +147,7 @@ def _directions(
     else:
         u = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], -1)
     which, pole = np.full(len(t), problem.station_index(station.name)), _pole(problem, station, t, pair)
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS if ask else 0):
         seen = problem.measure(station.name, _states(problem, place + FAR * u), t)
         full = np.full_like(z, np.nan)
         full[:, : seen.shape[1]] = z[:, : seen.shape[1]] - seen

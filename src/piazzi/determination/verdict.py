@@ -21,6 +21,7 @@ KEYS = ("seen", "alone", "converged", "honest", "agreed", "complete")
 DECISIVE = KEYS[:3]
 SURE = 0.999  # of the two-sided test of residuals
 NEAR, APART = 1.0, 3.0  # sigma, by which estimators of all measurements, and those of real time, may differ
+UNLIKELY = 0.01  # of another orbit that fits
 STILL = 1e-2  # sigma of a last step
 AXES = (
     "radial position",
@@ -107,7 +108,15 @@ def alone(given: Setup) -> Sentence:
     fixed = np.array(wide)[given.tracking.stations_of(given.problem)] & np.isfinite(given.tracking.values).any(axis=1)
     if np.unique(given.tracking.row_times[fixed]).size >= 2:
         return Sentence(True, 0.0, test, "Alone: positions were measured directly, so no other orbit fits them.")
-    return Sentence(None, None, test, "Alone: twins were not looked for.")
+    if given.guess.orbits is None:
+        return Sentence(None, None, test, "Alone: twins were not looked for.")
+    modes = given.guess.orbits.modes
+    others = float(sum(mode.probability for mode in modes[1:]))
+    test = f"all orbits that fit, from {given.guess.orbits.starts} starts"
+    if others <= UNLIKELY:
+        return Sentence(True, others, test, f"Alone: no other orbit that fits has a probability above {UNLIKELY:g}.")
+    more = _count(len(modes) - 1, "other orbit")
+    return Sentence(False, others, test, f"Not alone: {more} fit, with a probability of {number(others, 2)} together.")
 
 
 def converged(given: Setup, answer: Estimate, analysis: Analysis | None, keep: Array) -> Sentence:
