@@ -38,7 +38,8 @@ def rows_of(problem: Any, tracking: Tracking, most: int = 600, *, ask: bool = Tr
     ValueError
         Where no sensor measures a distance, its rate, a direction or a position.
     """
-    which = tracking.stations_of(problem)
+    places = {station.name: s for s, station in enumerate(problem.stations)}
+    which = tracking.stations_of(problem) if ask else np.array([places[name] for name in tracking.row_stations])
     t, z = tracking.row_times, tracking.values
     found: list[tuple[Rows, Array]] = []
     for s, station in enumerate(problem.stations):
@@ -83,9 +84,9 @@ def _of_station(problem: Any, station: Station, t: Array, z: Array, own: Array, 
         up = stands / np.linalg.norm(stands, axis=1)[:, None]
         along = up if u is None else np.where(np.isfinite(u).all(axis=1, keepdims=True), u, up)
         i = at["range"]
-        state = _states(problem, stands + z[:, i : i + 1] * along)
         added = np.zeros(len(t))
         if ask:
+            state = _states(problem, stands + z[:, i : i + 1] * along)
             added = problem.measure(station.name, np.nan_to_num(state), t)[:, i] - z[:, i]
         value = np.zeros((len(t), 3))
         value[:, 0] = z[:, i] - np.where(np.abs(added) < 1e3, added, 0.0)
@@ -146,8 +147,11 @@ def _directions(
         u = _from_horizon(problem, station, t, lon, lat)
     else:
         u = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], -1)
+    if not ask:
+        out[good] = u
+        return out
     which, pole = np.full(len(t), problem.station_index(station.name)), _pole(problem, station, t, pair)
-    for _ in range(ROUNDS if ask else 0):
+    for _ in range(ROUNDS):
         seen = problem.measure(station.name, _states(problem, place + FAR * u), t)
         full = np.full_like(z, np.nan)
         full[:, : seen.shape[1]] = z[:, : seen.shape[1]] - seen
