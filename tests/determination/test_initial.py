@@ -118,3 +118,15 @@ def test_tracking_of_stations(what):
     error = mode.mean - path[round((mode.epoch - EPOCH) / 20.0)]
     assert error @ np.linalg.solve(mode.covariance, error) < 30.0
     assert 0.7 < mode.weighted_rms < 1.3
+
+
+def test_a_determination_begins_by_itself_where_fixes_are_too_few_for_a_polynomial():
+    """Two fixes a quarter of a revolution apart, and two later ones: no velocity follows from neighbours."""
+    at = np.array([0.0, 9000.0, 21000.0, 30000.0])
+    path = truth(at)
+    found = pz.determine(observations(path[:, :3], at, 5.0))
+    assert found.determined
+    assert found.setup.guess.source == "initial orbits"
+    assert found.verdict["alone"].ok
+    assert np.linalg.norm(found.orbit.at(EPOCH)[:3] - STATE[:3]) < 5.0
+    assert found.modes[0]["probability"] > 0.99

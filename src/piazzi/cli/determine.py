@@ -40,7 +40,9 @@ def _help_all(ctx: click.Context, parameter: click.Parameter, asked: bool) -> No
 
 @click.command(cls=Determine)
 @click.argument("files", metavar="TRACKING...", nargs=-1, required=True)
-@click.option("--guess", metavar="ORBIT", help="Where to begin: elements, a state, or a file; see the examples.")
+@click.option(
+    "--guess", metavar="ORBIT", help="Where to begin: elements, a state, or a file; default none: all orbits that fit."
+)
 @click.option("--stations", "stations", metavar="FILE", multiple=True, help="Stations: SINEX, TOML, ilrs; may be repeated.")
 @click.option(
     "--with", "names", metavar="ESTIMATOR", multiple=True, help="May be repeated, the first is the answer.  [default: graph]"
@@ -113,7 +115,7 @@ def command(
     """Determine an orbit from TRACKING, with its covariance and a verdict.
 
     Takes files as `piazzi tracking` shows them. What they leave open is asked for by the option that says it, and what was
-    assumed is listed. Fixes of position (SP3, CPF, OEM) need no guess.
+    assumed is listed. Without --guess all orbits that fit are looked for.
 
     Examples:
       piazzi determine fixes.oem -o orbit.oem
