@@ -217,6 +217,26 @@ def test_the_shadow_is_met():
     assert 0 < dark.sum() < len(dark)
 
 
+def test_with_its_edge_as_an_event_they_agree_as_well(monkeypatch):
+    """Steps end where the satellite leaves the shadow: another sum than without, but less than the noise of the answer."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    whole = satellite(degree=4, Q=1e-10)
+    start = whole.step(whole.mean, 1620.0)[0]
+    plain = replace(whole, prior=pz.Gaussian(start, [1e4] * 3 + [1.0] * 3), prior_time=1620.0)
+    parted = replace(plain, model=replace(plain.model, events={"shadow": "edge"}))
+    tracking = pz.simulate(plain, np.arange(1620.0, 1920.0, 30.0), np.random.default_rng(0))
+    found = {}
+    for estimator in (pz.ExtendedKalmanFilter(), pz.Smoother(), pz.FactorGraph(), pz.SlidingWindow(1, iterations=1)):
+        one, other = (estimator.estimate(problem, tracking) for problem in (parted, plain))
+        assert one.success and other.success, one.message
+        sigma = np.sqrt(np.diagonal(other.covariance, axis1=1, axis2=2))
+        assert 0.0 < np.abs((one.mean - other.mean) / sigma).max() < 0.05
+        found[type(estimator).__name__] = one.mean
+    sigma = np.sqrt(np.diagonal(one.covariance, axis1=1, axis2=2))
+    assert np.abs((found["SlidingWindow"] - found["ExtendedKalmanFilter"]) / sigma).max() < 1e-3
+    assert_allclose(found["Smoother"][-1], found["ExtendedKalmanFilter"][-1], rtol=1e-12)
+
+
 @pytest.mark.slow
 def test_a_study_runs_on_it(tmp_path):
     estimators = {"filter": pz.ExtendedKalmanFilter(), "smoother": pz.Smoother()}
