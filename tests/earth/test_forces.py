@@ -208,6 +208,34 @@ def test_energy_changes_by_what_the_turn_of_the_field_does():
     assert abs(energy / first[0] - 1) > 1e-8  # the field is not the same all around
 
 
+def test_energy_and_spin_are_kept_in_a_field_that_is_the_same_all_around():
+    """E - omega . h of a rotating axisymmetric field, and each of both, but for the tilt of the axis in an hour."""
+    field = earth.gravity_field("EGM2008")
+    zonal = replace(field, c=np.where(np.eye(121)[0] > 0, field.c, 0.0), s=0.0 * field.s)
+    forces = earth.Forces(zonal, degree=6, bodies=(), tides=(), relativity=False)
+    eop = earth.EOP(ut1_utc=0.0)
+    p = problem(forces, functions=forces.functions(EPOCH, eop), integrator=pz.RungeKutta8(30))
+
+    def quantities(x, t):
+        W, rate = earth.rotation_rate("GCRF", "ITRF", EPOCH + t, eop)
+        turn = W.T @ rate
+        omega = np.array([turn[1, 2], turn[2, 0], turn[0, 1]])
+        energy, h = x[3:] @ x[3:] / 2 - potential(zonal, W @ x[:3], 6), np.cross(x[:3], x[3:])
+        return np.array([energy - omega @ h, energy, omega @ h])
+
+    first, x = quantities(X, 0.0), X
+    for k in range(4):
+        x = p.step(x, 1000.0, 1000.0 * k)[0]
+        np.testing.assert_allclose(quantities(x, 1000.0 * (k + 1)), first, rtol=1e-8)
+
+
+def test_a_negative_coefficient_is_a_fault_of_the_model():
+    lines = earth.coefficient_faults({"cd_a_m": -0.004, "cr_a_m": -0.001, "along": -1e-9}, {"cd_a_m": 0.001, "cr_a_m": 0.002})
+    assert lines[0].startswith("cd_a_m is -0.004 +- 0.001 m^2/kg, negative: air cannot push a satellite on")
+    assert lines[1].endswith("the measurements do not tell its sign")
+    assert earth.coefficient_faults({"cd_a_m": 0.004}) == ()
+
+
 def potential(field, place, degree):
     """The sum of a field's harmonics by SciPy-free Legendre functions of mpmath."""
     from math import factorial, sqrt

@@ -73,6 +73,8 @@ def test_lageos_2_over_a_day(data_dir):
     sphere = 1.134 * 6.97e-4, NOTHING
     assert fit(arc, field, 20, 1, sphere, False, 4)[0] < 0.045
     assert 0.3 < fit(arc, field, 20, 1, sphere, False, 4, tides_on=0.0)[0] < 0.45
+    assert 0.055 < fit(arc, "EGM2008", 20, 1, sphere, False, 4)[0] < 0.062
+    assert fit(arc, "IERS2010", 20, 1, sphere, False, 4)[0] < 0.05  # C20 of that date
     assert fit(arc, "EGM2008", 20, 1, sphere, True, 4)[0] < 0.045
 
 

@@ -7,6 +7,7 @@ from piazzi.earth.eop import EOP, EOPTable, EOPWarning, read_eop
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import GravityField, gravity_field, read_gravity
 from piazzi.earth.finding import use_data
+from piazzi.earth.force_faults import coefficient_faults
 from piazzi.earth.forces import Forces
 from piazzi.earth.formula import Formula
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
@@ -34,7 +35,8 @@ __all__ = [
     "BODIES", "EOP", "FRAMES", "LASER_SPHERES", "Body", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity",
     "EphemerisWarning", "Epoch", "ForceChoice", "Forces", "Formula", "Gravity", "GravityField", "LaserSphere", "Place",
     "Rotation", "SpaceWeather", "SpaceWeatherWarning", "Station", "StationList", "StationWarning", "Thermosphere", "Weather",
-    "azimuth_elevation_range", "body", "default_forces", "geodetic_to_position", "gravity_field", "ilrs_stations",
+    "azimuth_elevation_range", "body", "coefficient_faults", "default_forces", "geodetic_to_position",
+    "gravity_field", "ilrs_stations",
     "laser_sphere", "media", "pole_tide",
     "position_to_geodetic", "read_eop", "read_forces", "read_gravity", "read_space_weather", "read_stations", "rotation",
     "rotation_rate", "sensors", "solid_tide", "station_displacement", "transform", "up_north_east", "use_data",
