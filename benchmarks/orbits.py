@@ -14,7 +14,8 @@ from floor.space import SpaceFloor
 import piazzi as pz
 from piazzi import earth, kernels
 from piazzi.earth.constants import ASTRONOMICAL_UNIT, EARTH_SPIN, GM, SOLAR_PRESSURE, SUN_RADIUS
-from piazzi.earth.force_text import EARTH_RADIUS, FLATTENING, air
+from piazzi.earth.force_air import air
+from piazzi.earth.force_text import EARTH_RADIUS, FLATTENING
 from piazzi.kernels.spec import KernelSpec
 from piazzi.kernels.tables import table_source
 from piazzi.model import Model
@@ -125,8 +126,12 @@ def floor(degree: int, every: bool, gradient_degree: int | None = None) -> Space
 @cache
 def problem(degree: int, every: bool, gradient_degree: int | None = None) -> pz.Problem:
     """The orbit as a problem; with `every` force, the coefficients of drag and radiation are estimated."""
-    chosen: dict[str, Any] = {"radiation": "cannonball", "drag": "exponential", "air_height": HEIGHT} if every else {}
-    forces = earth.Forces(degree=degree, gradient_degree=gradient_degree, relativity=False, tides=(), **chosen)
+    chosen: dict[str, Any] = (
+        {"radiation": "cannonball", "shadows": ("earth",), "drag": "exponential", "air_height": HEIGHT} if every else {}
+    )
+    forces = earth.Forces(
+        degree=degree, gradient_degree=gradient_degree, bodies=("sun", "moon"), relativity=False, tides=(), **chosen
+    )
     roles = dict.fromkeys(("cd_a_m", "cr_a_m"), "estimated") if every else {}
     values: dict[str, Any] = dict(forces.values)
     if every:

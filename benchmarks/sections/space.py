@@ -122,7 +122,7 @@ def _steps(every: bool) -> Iterator[Figure]:
     for degree in (20,) if every else DEGREES:
         case, beside = orbits.problem(degree, every), orbits.floor(degree, every)
         for name, (method, order, make) in METHODS.items():
-            count = 240
+            count = 1440  # a day: what a call costs in Python does not count
             ours = _timed(orbits.propagation(case, make(max_step=60.0), 60.0 * count), count)
             found = _beside(ours, lambda m=method, o=order, b=beside, n=count: b.propagate(m, n, 60.0 * n, o)[2] / n)
             bound = DAY_BOUND if every else BOUND
