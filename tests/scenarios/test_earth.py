@@ -273,3 +273,13 @@ def test_what_is_wrong_is_said_with_its_place(tmp_path, given, message):
 def test_forces_need_a_date(tmp_path):
     with pytest.raises(ScenarioError, match="earth: needs dates"):
         load(tmp_path, text=FILE.replace('epoch = "2016-02-13T16:00:00 UTC"', ""))
+
+
+def test_a_date_without_a_scale_is_refused(tmp_path):
+    with pytest.raises(ScenarioError, match=r"epoch: .*scale"):
+        load(tmp_path, text=FILE.replace(" UTC", ""))
+
+
+def test_a_state_inside_the_earth_is_refused(tmp_path):
+    with pytest.raises(ScenarioError, match=r"prior: is 6,301 km from the centre of the Earth, which is below its surface"):
+        load(tmp_path, text=FILE.replace("7000e3", "6300e3"))

@@ -94,10 +94,15 @@ def _refusals(table: Table, key: str) -> Iterator[None]:
 
 
 def step_of(states: Sequence[str], mean: Array) -> float:
-    """The longest step (s) of order 8 on the orbit of a mean state; raises ValueError for one below the surface."""
+    """The longest step (s) of order 8 on the orbit of a mean state; raises ValueError for one inside the Earth."""
+    from piazzi.earth.geodetic import ELLIPSOIDS
     from piazzi.earth.stepping import longest_step
 
     r, v = (mean[[states.index(name) for name in GROUPS[group]]] for group in ("position", "velocity"))
+    radius, flattening = ELLIPSOIDS["WGS84"]
+    distance = float((r @ r) ** 0.5)
+    if distance < radius * (1.0 - flattening):
+        raise ValueError(f"is {distance / 1e3:,.0f} km from the centre of the Earth, which is below its surface")
     return longest_step(r, v)
 
 

@@ -214,8 +214,10 @@ def read_problem(file: Table, name: str, units: Units, start: float | None = Non
         places = [s for s in stations if s is not None]
         given = (physics.model, prior, noise, places, parameters, integrator, prior_time, truth, name, manoeuvres)
         problem = Problem(*given, functions=physics.functions, epoch=epoch)
-        if integrator is None and forces is not None:
-            problem = replace(problem, integrator=RungeKutta8(max_step=step_of(physics.states, prior.mean)))
+        if forces is not None:
+            with file.faults.at("prior"):
+                step = step_of(physics.states, prior.mean)
+                problem = problem if integrator is not None else replace(problem, integrator=RungeKutta8(max_step=step))
         with file.faults.at("truth"):
             true_problem(problem)
         with file.faults.at("gauss_markov"):
