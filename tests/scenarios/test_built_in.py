@@ -12,7 +12,7 @@ from piazzi.scenarios import check, load_scenario, names, show
 
 FOUNDING = ["b612-range", "b612-range-q0", "satellite-bearing"]
 STUDIES = ["founding-study", "founding-study-mismatched"]
-ORBITS = ["gps-position", "leo-radar", "sun-sync-day"]
+ORBITS = ["geo-optical", "gps-position", "gto-radar", "lageos2-laser", "leo-radar", "sun-sync-day"]
 
 
 def test_these_problems_are_built_in():
