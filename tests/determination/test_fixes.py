@@ -8,6 +8,7 @@ import pytest
 import piazzi as pz
 from piazzi import earth
 from piazzi.determination import Guess
+from piazzi.determination.against import against
 from piazzi.estimate.chi_square import quantile
 from tests.determination.fixing import CR_A_M, EPOCH, STATE, observations, truth
 
@@ -130,7 +131,8 @@ def test_the_object_is_json(found):
     np.linalg.cholesky(np.array(facts["covariance"]))
     assert np.sqrt(np.diag(facts["covariance"])) == pytest.approx(facts["sigma"])
     (group,) = [g for g in facts["residuals"] if g["component"] == "x"]
-    assert group["count"] == group["used"] == len(T) and group["unit"] == "m"
+    assert group["count"] == len(T) and 0.9 * len(T) < group["used"] <= len(T) and group["unit"] == "m"
+    assert group["count"] - group["used"] == sum(r["component"] == "x" for r in facts["rejected"])
 
 
 def test_residuals_and_what_is_printed(found):
@@ -165,3 +167,34 @@ def test_a_guess_a_thousand_kilometres_off(noisy, found):
     other = pz.determine(observations(noisy, T, SIGMA), guess=_guess(state))
     assert other.determined
     assert np.abs(other.orbit.at() - found.orbit.at())[:3].max() < 1e-3
+
+
+def test_gross_errors_are_found_and_nothing_else_is_lost(path):
+    """Five of 48 fixes are 20 sigma off: all are left out and named, and of the good ones as many as chance says."""
+    rng = np.random.default_rng(11)
+    values = path[:, :3] + SIGMA * rng.standard_normal((len(T), 3))
+    bad = rng.choice(len(T), 5, replace=False)
+    values[bad] += 20.0 * SIGMA * np.array([1.0, -1.0, 1.0])
+    found = pz.determine(observations(values, T, SIGMA))
+    assert found.determined and not found.keep[bad].any()
+    lost = np.setdiff1d(np.flatnonzero(~found.keep), bad)
+    assert len(lost) <= 5  # 43 good ones, of which 1.8 % are beyond the gate
+    facts = found.to_dict()
+    assert {one["reason"] for one in facts["rejected"]} == {"outlier"}
+    assert len(facts["rejected"]) == 3 * (5 + len(lost))
+    good = pz.determine(observations(np.delete(values, bad, axis=0), np.delete(T, bad), SIGMA))
+    assert np.abs(found.orbit.at(EPOCH) - good.orbit.at(EPOCH))[:3].max() < 0.1
+
+
+def test_a_row_twice_counts_once(noisy, found):
+    again = observations(np.vstack([noisy, noisy[-3:]]), np.append(T, T[-3:]), SIGMA)
+    other = pz.determine(again)
+    assert [one["reason"] for one in other.to_dict()["rejected"]].count("duplicate") == 9
+    apart = np.abs(other.orbit.at() - found.orbit.at())[:3]  # where estimators begin counts a share of 1e-4
+    assert (apart < 1e-3 * np.sqrt(np.diag(found.orbit.covariance())[:3])).all()
+
+
+def test_the_difference_to_another_orbit(found, tmp_path):
+    found.write(tmp_path / "own.oem", step=900.0)
+    apart = against(found, tmp_path / "own.oem")
+    assert apart.rms_3d < 1e-3 and apart.covered == 1.0

@@ -80,6 +80,7 @@ def _help_all(ctx: click.Context, parameter: click.Parameter, asked: bool) -> No
 )
 @click.option("--object", "chosen", metavar="NAME", help="Which object, in files of several.")
 @click.option("--each", is_flag=True, help="Every object, one after the other; products by {object}.")
+@click.option("--against", metavar="FILE", help="Compare with another orbit, at its rows within the span.")
 @click.option("--strict", is_flag=True, help="Exit 3 where any sentence of the verdict is false.")
 @click.option("--anyway", is_flag=True, help="Write products of an orbit that is not determined too.")
 @click.option("--show", is_flag=True, help="Show forces, unknowns, noise and assumptions, and stop.")
@@ -107,6 +108,7 @@ def command(
     covariance: str,
     chosen: str | None,
     each: bool,
+    against: str | None,
     strict: bool,
     anyway: bool,
     show: bool,
@@ -134,6 +136,10 @@ def command(
     _check_outputs(output_file, report, each)
     every = step and _seconds(step)
     _check_words(names, span, epoch)
+    if against is not None:
+        from piazzi.formats import read_ephemeris
+
+        read_ephemeris(against)  # what is wrong with it is said before the work
     words = dict(
         guess=guess, stations=stations or None, with_=names, forces=forces, estimate=estimate, consider=consider,
         mass=_positive(mass, "--mass", number), area=_positive(area, "--area", number), com=com and number(com), epoch=epoch,
@@ -147,6 +153,8 @@ def command(
         result = _one(files, one, words, show)
         if result is None:
             continue
+        if against is not None:
+            result = _compared(result, against, span)
         found.append(result)
         wrote = _write(result, output_file, report, span, every or None, covariance == "formal", anyway)
         status = max(status, _status(result, strict))
@@ -254,6 +262,15 @@ def _print(found: Determination, as_json: bool, each: bool, wrote: Sequence[str]
         output.print_rich(line(found), *wrote)
     else:
         output.print_rich(found, *wrote)
+
+
+def _compared(found: Determination, other: str, span: str | None) -> Determination:
+    """The determination with the difference to another orbit among its notes."""
+    from dataclasses import replace
+
+    from piazzi.determination.against import against
+
+    return replace(found, notes={**found.notes, "against": {"file": other, **against(found, other, span).to_dict()}})
 
 
 def _file_name(name: str) -> str:

@@ -62,11 +62,14 @@ def analysed(given: Setup, states: Array) -> Analysis:
         computed = predicted(problem, inputs, states)
     J, m = inputs.z.shape
     stations = given.tracking.stations_of(problem)
-    residual = wrapped(problem, stations, inputs.z - computed)
+    sigma = np.sqrt(np.diagonal(problem.station_noise, axis1=1, axis2=2))[stations]
+    full = problem.station_correlated[stations].astype(np.bool_)[:, None]
+    # along an angle on the sky, as kernels have it; of components with a full covariance whitened ones are mixed
+    residual = np.where(full, wrapped(problem, stations, inputs.z - computed), shot.innovations * sigma)
     constants = len(problem.model.states)
-    sigma = np.sqrt(np.diag(problem.covariance))[constants:]
-    known = np.flatnonzero(sigma > 0)
+    spread = np.sqrt(np.diag(problem.covariance))[constants:]
+    known = np.flatnonzero(spread > 0)
     prior = np.zeros((len(known), problem.model.n))
-    prior[np.arange(len(known)), constants + known] = 1.0 / sigma[known]
-    miss = (states[0, constants:] - problem.mean[constants:])[known] / sigma[known]
+    prior[np.arange(len(known)), constants + known] = 1.0 / spread[known]
+    miss = (states[0, constants:] - problem.mean[constants:])[known] / spread[known]
     return Analysis(residual, shot.innovations, shot.rows.reshape(J, m, -1), prior, -miss)

@@ -12,6 +12,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis, analysed
 from piazzi.determination.approach import approached
+from piazzi.determination.editing import edited
 from piazzi.determination.fit import estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
@@ -26,8 +27,10 @@ from piazzi.earth.dates import read_date
 from piazzi.earth.rotation import frame_named
 from piazzi.estimate.estimator import Estimate, Estimator
 from piazzi.formats import Observations, concatenate, read_tracking
+from piazzi.problem.checks import Array
 
 SOURCES = (str, os.PathLike)
+ROUNDS = 4  # of the answer, while rows are left out or taken back
 
 
 def determine(
@@ -107,7 +110,7 @@ def prepared(
     _, at = _instant(epoch)
     told = dict(conventions) | ({"frame": frame} if frame else {})
     rows = of_object(_observations(tracking, told), object)
-    seen = measured(rows, stations, com=com, corrected=told.get("corrections") == "applied")
+    seen = measured(rows, stations, com=com, corrections=told.get("corrections"))
 
     def chosen(orbit: Guess) -> Chosen:
         found = chosen_forces(forces, orbit.state, name=seen.object, mass=mass, area=area)
@@ -131,26 +134,45 @@ def solved(
     notes: Mapping[str, Any] | None = None,
 ) -> Determination:
     """The determination of a problem by estimators, of which the first is the answer."""
-    keep = np.ones(len(given.rows), dtype=np.bool_)
-    reasons = np.full(len(given.rows), "", dtype=np.object_)
     found: dict[str, Estimate] = {}
     started = time.perf_counter()
-    for name, estimator in chosen.items():
+    answer = next(iter(chosen))
+    announce(answer)
+    keep, reasons, found[answer], analysis = _answered(given, chosen[answer])
+    for name, estimator in list(chosen.items())[1:]:
         announce(name)
         found[name] = estimate(given, estimator, keep)
     seconds = time.perf_counter() - started
-    answer = next(iter(found))
     announce("testing")
-    analysis = _analysis(given, found[answer])
-    sentences = verdict(given, answer, found, analysis, keep)
+    sentences = verdict(given, answer, found, analysis, keep, reasons)
     return Determination(given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}))
 
 
-def _analysis(given: Setup, answer: Estimate) -> Analysis | None:
-    """None where the estimate is not finite, or cannot be linearised."""
-    if not np.isfinite(answer.mean).all():
+def _answered(given: Setup, estimator: Estimator) -> tuple[Array, Array, Estimate, Analysis | None]:
+    """Rows that are kept, why the others are not, the answer from these, and what it leaves: edited until nothing changes."""
+    keep = np.ones(len(given.rows), dtype=np.bool_)
+    reasons = np.full(len(keep), "", dtype=np.object_)
+    first = _analysis_at(given, given.states)
+    robust = getattr(estimator, "loss", None) is not None  # it weighs rows itself
+    if first is not None and not robust:
+        keep, reasons = edited(given, first)
+    for _ in range(ROUNDS):
+        answer = estimate(given, estimator, keep)
+        analysis = _analysis_at(given, answer.mean) if answer.view == "delayed" else first
+        if analysis is None or robust or answer.view != "delayed":
+            break
+        again, why = edited(given, analysis, keep)
+        if (again == keep).all():
+            break
+        keep, reasons = again, why
+    return keep, reasons, answer, analysis
+
+
+def _analysis_at(given: Setup, states: Array) -> Analysis | None:
+    """None where the states are not finite, or cannot be linearised about."""
+    if not np.isfinite(states).all():
         return None
-    found = analysed(given, answer.mean)
+    found = analysed(given, states)
     there = ~np.isnan(given.tracking.values)
     return found if np.isfinite(found.whitened[there]).all() and np.isfinite(found.rows[there]).all() else None
 

@@ -98,6 +98,9 @@ def _turned(noise: Array, frame: str, dates: Sequence[Any]) -> Array:
 def _frame(observations: Observations, segment: int) -> str:
     frame = observations.segments[segment].frame
     file = f"{observations.files[0]}: " if observations.files else ""
+    centre = dict(observations.segments[segment].said).get("CENTER_NAME", "EARTH").strip().upper()
+    if centre != "EARTH":
+        raise ValueError(f"{file}fixes are about {centre}; orbits about the Earth are determined")
     if frame is None:
         raise ValueError(f"{file}the file does not say in which axes fixes are: --frame ITRF or another")
     try:

@@ -52,7 +52,7 @@ def _part(context: Context, rows: Array) -> Part:
     first = int(rows[0])
     segment = observations.segments[observations.segment[first]]
     site = context.site(int(observations.station[first]))
-    way = _way(context, segment, TAGS[observations.tag[first]] or segment.tag)
+    way = way_of(context, segment, int(observations.tag[first]))
     sensor = _sensor(way)
     numbers: dict[str, Any] = {"centre_of_mass": _centre(context, segment)}
     weather = None
@@ -81,7 +81,9 @@ def _sensor(way: Way) -> Any:
     return sensors.range(way.path, name=name, tag=way.tag, relativity=True, troposphere=way.troposphere)
 
 
-def _way(context: Context, segment: Segment, tag: str | None) -> Way:
+def way_of(context: Context, segment: Segment, tag_index: int) -> Way:
+    """Path, tag and medium of a segment's ranges or rates; raises ValueError for what is open, or not taken yet."""
+    tag = TAGS[tag_index] or segment.tag
     if segment.way not in ("one-way", "two-way"):
         what = (
             f"{segment.way} ranges are" if segment.way else "ranges of a path that the file does not say (--range two-way) are"
@@ -93,7 +95,8 @@ def _way(context: Context, segment: Segment, tag: str | None) -> Way:
     if segment.way == "two-way" and segment.range_is is None:
         raise ValueError(f"{context.where}are ranges half of the way or all of it? --range two-way or --range round-trip")
     if tag is None:
-        raise ValueError(f"{context.where}what are times of? --tag transmit, bounce or receive")
+        tag = "bounce"
+        context.said["times are those of the bounce (--tag transmit or receive says otherwise)"] = None
     return Way(segment.way, EVENTS[tag], _troposphere(context, segment))
 
 

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination.directions import AZEL, RADEC, ascensions, azimuths
 from piazzi.determination.fixes import fixes
 from piazzi.determination.parts import Part
 from piazzi.determination.ranging import ranges
+from piazzi.determination.rates import rates
 from piazzi.determination.sites import Context, sites_of, with_station_sigmas
 from piazzi.earth import Epoch
 from piazzi.formats import KINDS, Observations
@@ -23,6 +25,9 @@ MOST_SIGMAS = 200  # different noise matrices of one station and sensor; beyond,
 MAKERS: Mapping[tuple[str, ...], Callable[[Context, Array], Sequence[Part]]] = {
     ("x", "y", "z", "vx", "vy", "vz"): fixes,
     ("range",): ranges,
+    AZEL: azimuths,
+    RADEC: ascensions,
+    ("range_rate", "range_rate_averaged"): rates,
 }
 
 
@@ -61,7 +66,7 @@ class Measured:
 
 
 def measured(
-    observations: Observations, stations: Any = None, *, com: float | None = None, corrected: bool = False
+    observations: Observations, stations: Any = None, *, com: float | None = None, corrections: str | None = None
 ) -> Measured:
     """Sensors, stations and tracking of observations of one object.
 
@@ -70,7 +75,7 @@ def measured(
     observations : of one object
     stations : see `sites.sites_of`; default those of the ILRS for lasers
     com : what ranges are shorter by than to the centre of mass, m; default by the object's name
-    corrected : whether ranges are corrected for media already, which the files do not say
+    corrections : "applied" or "open", whether media are corrected for already where the files do not say it
 
     Raises
     ------
@@ -94,7 +99,7 @@ def measured(
     _check_sigmas(everything, index)
     epoch = Epoch.at(float(everything.epoch.whole + np.floor(everything.t[index[0]])))
     known = everything.objects
-    context = Context(everything, epoch, sites, known[0] if known else "", com, corrected)
+    context = Context(everything, epoch, sites, known[0] if known else "", com, corrections == "applied", corrections == "open")
     parts = _parts(context, index)
     sensors, places, names, labels = _stations(parts)
     times = np.concatenate([part.t for part in parts]) + (everything.epoch - epoch)
@@ -148,7 +153,7 @@ def _ask(observations: Observations) -> None:
     waiting = [text for text in observations.open if "--" in text and not (known and "--sigma" in text)]
     if waiting:
         more = f" (and {len(waiting) - 1} more: piazzi tracking lists them)" if len(waiting) > 1 else ""
-        raise ValueError(f"{_where(observations)}the file does not say {_plain(waiting[0])}{more}")
+        raise ValueError(f"{_where(observations)}left open by the file: {_plain(waiting[0])}{more}")
 
 
 def _plain(text: str) -> str:

@@ -119,6 +119,10 @@ def remarks(facts: dict[str, Any]) -> Iterator[str]:
     field = f"{forces['gravity']} to degree {forces['degree']}" if forces["degree"] else "the Earth as a point"
     names = [field, *forces["bodies"], *(f"{t} tides" for t in forces["tides"]), *extra, *forces["empirical"]]
     yield f"Forces ({forces['source']}): {', '.join(names)}."
+    if "against" in facts:
+        apart = facts["against"]
+        rms = ", ".join(f"{axis} {number(value, 3)} m" for axis, value in apart["rms"].items())
+        yield f"Against {apart['file']}: rms {rms} at {apart['count']:,} times from {apart['first']} to {apart['last']}."
     for what, count in facts["left_out"].items():
         yield f"Left out: {what}{f' ({count:,})' if isinstance(count, int) else f': {count}'}."
     for text in facts["assumed"]:

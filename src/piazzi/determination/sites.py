@@ -28,7 +28,8 @@ class Context:
     sites : stations, None where nobody gave any
     object : name of what is seen
     com : centre of mass, m, where the user says it
-    corrected : whether the user says that ranges are corrected for media already
+    corrected : whether the user says that measurements are corrected for media already
+    open : whether the user says that they are not
     """
 
     observations: Observations
@@ -37,6 +38,7 @@ class Context:
     object: str
     com: float | None = None
     corrected: bool = False
+    open: bool = False
     said: dict[str, None] = field(default_factory=dict)
 
     def site(self, index: int) -> Station:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.analysis import Analysis
+from piazzi.determination.editing import MOST, OUTLIER, STATION
 from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate
@@ -48,7 +49,7 @@ class Sentence:
 
 
 def verdict(
-    given: Setup, name: str, estimates: Mapping[str, Estimate], analysis: Analysis | None, keep: Array
+    given: Setup, name: str, estimates: Mapping[str, Estimate], analysis: Analysis | None, keep: Array, reasons: Array
 ) -> dict[str, Sentence]:
     """The six of an answer, that of the first estimate."""
     answer = estimates[name]
@@ -59,7 +60,7 @@ def verdict(
                 seen(given, analysis, keep),
                 alone(given),
                 converged(given, answer, analysis, keep),
-                honest(given, analysis, keep),
+                honest(given, analysis, keep, reasons),
                 agreed(given, name, estimates),
                 Sentence(None, None, "none yet", "Complete: what the forces leave out is not weighed against sigma yet."),
             ),
@@ -76,7 +77,8 @@ def seen(given: Setup, analysis: Analysis | None, keep: Array) -> Sentence:
     if analysis is None:
         return Sentence(None, None, test, "Seen: the fit gave no orbit to ask this of.")
     scale = scale_of(given, given.states[0])
-    values, directions = singular(analysis.information(keep, scale))
+    root = analysis.information(keep, scale)
+    values, directions = singular(root)
     smallest, weakest = float(values[-1]), directions[-1] * scale
     many = int(np.isfinite(analysis.whitened[keep]).sum())
     words = _direction(given.states[0], weakest)
@@ -87,11 +89,19 @@ def seen(given: Setup, analysis: Analysis | None, keep: Array) -> Sentence:
             f"Not seen: {many} measurements leave {blind} of {len(values)} directions as open as the guess, "
             f"the widest {words}.",
         )  # fmt: skip
-    size = float(np.linalg.norm(weakest[:3]) / smallest)
+    words, size = _widest(given.states[0], root, scale)
     return Sentence(
         True, smallest, test,
-        f"Seen: {many} measurements alone determine the orbit, the widest direction, {words}, to {_metres(size)} at its start.",
+        f"Seen: {many} measurements alone determine the orbit, at its start to {_metres(size)} in the widest axis, {words}.",
     )  # fmt: skip
+
+
+def _widest(state: Array, root: Array, scale: Array) -> tuple[str, float]:
+    """The direction in which the first position is known worst, and its sigma (m)."""
+    inverse = np.linalg.solve(root, np.eye(len(scale)))[:3] * scale[:3, None]
+    values, vectors = np.linalg.eigh(inverse @ inverse.T)
+    local = state_axes(state[:3], state[3:6])[:3, :3] @ vectors[:, -1]
+    return AXES[int(np.argmax(np.abs(local)))].partition(" ")[0], float(np.sqrt(max(values[-1], 0.0)))
 
 
 def _direction(state: Array, change: Array) -> str:
@@ -138,11 +148,18 @@ def converged(given: Setup, answer: Estimate, analysis: Analysis | None, keep: A
     )
 
 
-def honest(given: Setup, analysis: Analysis | None, keep: Array) -> Sentence:
+def honest(given: Setup, analysis: Analysis | None, keep: Array, reasons: Array) -> Sentence:
     """Whether residuals are as large as their sigmas say."""
     test = f"sum of squared residuals in sigma against chi-square at {SURE:.1%}"
     if analysis is None:
         return Sentence(None, None, test, "Honest: there are no residuals to judge by.")
+    wrong = sorted({given.measured.labels[given.tracking.row_stations[i]] for i in np.flatnonzero(reasons == STATION)})
+    if wrong:
+        names = ", ".join(wrong)
+        return Sentence(False, None, test, f"Not honest: all measurements of {names} contradict those of the others.")
+    share = float(np.mean(reasons[np.isfinite(analysis.whitened).any(axis=1)] == OUTLIER))
+    if share > MOST:
+        return Sentence(False, None, test, f"Not honest: {share:.0%} of the measurements do not fit the others.")
     whitened = analysis.whitened[keep]
     squares = whitened[np.isfinite(whitened)] ** 2
     free = len(squares) - given.problem.model.n + len(analysis.prior_miss)

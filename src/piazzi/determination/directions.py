@@ -1,0 +1,88 @@
+"""Directions from stations on the ground: azimuth with elevation, right ascension with declination, in pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from piazzi.determination.parts import Part
+from piazzi.determination.ranging import EVENTS, passes
+from piazzi.determination.sites import Context, weather_of
+from piazzi.earth import sensors
+from piazzi.earth.rotation import frame_named
+from piazzi.formats import TAGS
+from piazzi.problem.checks import Array
+
+AZEL, RADEC = ("azimuth", "elevation"), ("right_ascension", "declination")
+
+
+def azimuths(context: Context, index: Array) -> Sequence[Part]:
+    """Rows of azimuth and elevation as parts, one for each station, segment and pass."""
+    return [_part(context, rows, AZEL) for rows in passes(context, index)]
+
+
+def ascensions(context: Context, index: Array) -> Sequence[Part]:
+    """Rows of right ascension and declination, likewise."""
+    return [_part(context, rows, RADEC) for rows in passes(context, index)]
+
+
+def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
+    observations = context.observations
+    rows = paired(context, index, kinds)
+    first = int(index[0])
+    segment = observations.segments[observations.segment[first]]
+    if observations.place[index].max() >= 0:
+        raise ValueError(f"{context.where}directions from observers that move are not determined from yet")
+    site = context.site(int(observations.station[first]))
+    tag = EVENTS[TAGS[observations.tag[first]] or segment.tag or "bounce"]
+    if kinds == AZEL:
+        bent = "radio" if context.open else None
+        if not context.open:
+            context.said["azimuths and elevations are free of refraction (--corrections open says otherwise)"] = None
+        sensor = _azimuth(tag, bent)
+    else:
+        if segment.angles is None:
+            raise ValueError(f"{context.where}what are the directions? --angles astrometric, geocentric or apparent")
+        sensor = _ascension(segment.angles, frame_named(segment.frame or "GCRF"), tag)
+    weather = weather_of(observations, index, site, context.epoch)[0]
+    given = sensor.at(site, context.epoch, 1.0, weather=weather)
+    there = rows >= 0
+    values = np.where(there, observations.value[rows], np.nan)
+    sigma = np.where(there, observations.sigma[rows], np.nan)
+    sigma = np.where(there, sigma, sigma[:, ::-1])
+    noise = np.zeros((len(rows), 2, 2))
+    noise[:, [0, 1], [0, 1]] = sigma**2
+    both = there.all(axis=1)
+    correlation = np.where(both, np.nan_to_num(observations.correlation[rows[:, 1]]), 0.0)
+    noise[:, 0, 1] = noise[:, 1, 0] = correlation * sigma[:, 0] * sigma[:, 1]
+    t = observations.t[rows.max(axis=1)]
+    return Part(sensor, site.name, t, values, noise, rows, given["place"], given["numbers"], sensor.functions(context.epoch))
+
+
+def paired(context: Context, index: Array, kinds: tuple[str, ...]) -> Array:
+    """(R, m) rows of one time together, one of each kind, -1 where there is none."""
+    observations = context.observations
+    what = np.array([kinds.index(kind) if kind in kinds else -1 for kind in observations.kinds])[observations.kind[index]]
+    found: dict[tuple[float, int], list[int]] = {}
+    seen: dict[tuple[float, int], int] = {}
+    for row, kind in zip(index.tolist(), what.tolist(), strict=True):
+        key = (float(observations.t[row]), kind)
+        again = seen.get(key, 0)
+        seen[key] = again + 1
+        found.setdefault((key[0], again), [-1] * len(kinds))[kind] = row
+    return np.array([found[key] for key in sorted(found)], dtype=np.int64)
+
+
+@lru_cache(maxsize=64)
+def _azimuth(tag: str, bent: str | None) -> Any:
+    name = "_".join(["azimuth_elevation", tag, *([bent] if bent else [])])
+    return sensors.azimuth_elevation(name=name, tag=tag, refraction=bent)
+
+
+@lru_cache(maxsize=64)
+def _ascension(angles: str, axes: str, tag: str) -> Any:
+    name = "_".join(["right_ascension", angles, axes.lower(), tag])
+    return sensors.right_ascension_declination(angles, name=name, axes=axes, tag=tag)

@@ -1,0 +1,104 @@
+"""Which rows are believed: tested by what the others say of them, decided anew until nothing changes.
+
+A row's residual is compared with what it should be like: R - H P H^T of a row that was used, whose residual the fit has made
+smaller, R + H P H^T of one that was not (Carpino, Milani and Chesley 2003, Icarus 166, 248).
+"""
+
+from __future__ import annotations
+
+from math import exp
+
+import numpy as np
+
+from piazzi.determination.analysis import Analysis
+from piazzi.determination.setup import Setup, scale_of
+from piazzi.estimate.chi_square import quantile
+from piazzi.problem.checks import Array
+
+OUT, BACK = 1.0 - exp(-4.0), 1.0 - exp(-3.5)  # chi-square of 8 and 7 with two degrees of freedom
+SPARE = 8  # values beyond the unknowns, below which nothing is left out
+ROUNDS = 20
+MOST = 0.2  # of the rows: beyond, it is no edit but a verdict
+FLOOR = 1e-6  # of a variance: a row that alone determines something has no residual
+OUTLIER, STATION, DUPLICATE = "outlier", "wrong station", "duplicate"
+
+
+def edited(given: Setup, analysis: Analysis, keep: Array | None = None) -> tuple[Array, Array]:
+    """Which rows (J,) to keep, and why not the others, "" for those that are kept.
+
+    Parameters
+    ----------
+    given, analysis : the set-up, and residuals with derivatives near the answer
+    keep : those that were kept so far; default all but duplicates
+    """
+    reasons = np.full(len(given.rows), "", dtype=np.object_)
+    there = np.isfinite(analysis.whitened)
+    some = there.any(axis=1)
+    repeated = duplicates(given)
+    keep = ~repeated if keep is None else keep & ~repeated
+    if given.problem.is_noise_free and there[keep].sum() >= given.problem.model.n + SPARE:
+        keep = _settled(given, analysis, keep, repeated, there)
+    which = given.tracking.stations_of(given.problem)
+    labels = np.array([given.measured.labels[s.name] for s in given.problem.stations], dtype=object)[which]
+    reasons[some & ~keep] = OUTLIER
+    for label in dict.fromkeys(labels[some & ~keep].tolist()):
+        own = (labels == label) & some & ~repeated
+        if not keep[own].any() and own.sum() > 1:
+            reasons[own] = STATION
+    reasons[repeated] = DUPLICATE
+    return keep, reasons
+
+
+def _settled(given: Setup, analysis: Analysis, keep: Array, repeated: Array, there: Array) -> Array:
+    """The rows that are kept when nothing changes any more, or after `ROUNDS`."""
+    unit = scale_of(given, given.states[0])
+    degrees = there.sum(axis=1)
+    out = np.array([np.inf] + [quantile(OUT, m) for m in range(1, there.shape[1] + 1)])[degrees]
+    back = np.array([np.inf] + [quantile(BACK, m) for m in range(1, there.shape[1] + 1)])[degrees]
+    wide = np.inf
+    for _ in range(ROUNDS):
+        squared = _squared(analysis, keep, unit, there)
+        own = squared[keep & (degrees > 0)] / degrees[keep & (degrees > 0)]
+        middle = float(np.median(own)) / 0.4549 if own.size else 1.0  # of a chi-square with one degree of freedom
+        wide = min(wide, max(1.0, middle))
+        new = np.where(keep, squared <= out * wide, squared < back * wide) & ~repeated
+        if (new == keep).all() or there[new].sum() < given.problem.model.n + SPARE:
+            break
+        keep = new
+    return keep
+
+
+def _squared(analysis: Analysis, keep: Array, unit: Array, there: Array) -> Array:
+    """Squares (J,) of residuals after a fit of the rows to keep, in units of what they should be like."""
+    J, m, n = analysis.rows.shape
+    rows = np.nan_to_num(analysis.rows) * unit
+    w = np.nan_to_num(analysis.whitened)
+    A = np.vstack([rows[keep].reshape(-1, n), analysis.prior * unit])
+    b = np.concatenate([w[keep].reshape(-1), analysis.prior_miss])
+    step = np.linalg.lstsq(A, b, rcond=None)[0]
+    left = w - rows @ step
+    root: Array = np.asarray(np.linalg.qr(A, mode="r"))
+    if np.abs(np.diag(root)).min() <= 1e-12 * np.abs(np.diag(root)).max():
+        return np.asarray((left**2).sum(axis=1))
+    solved = np.linalg.solve(root.T, rows.reshape(-1, n).T).T.reshape(J, m, n)
+    spread = solved @ np.swapaxes(solved, 1, 2)
+    expected = np.eye(m) + np.where(keep[:, None, None], -spread, spread)
+    values, vectors = np.linalg.eigh(np.where(there[:, :, None] & there[:, None, :], expected, np.eye(m)))
+    turned = np.einsum("jik,ji->jk", vectors, np.where(there, left, 0.0))
+    return np.asarray((turned**2 / np.maximum(values, FLOOR)).sum(axis=1))
+
+
+def duplicates(given: Setup) -> Array:
+    """(J,) rows that say the same as one before: of the same time, station and values."""
+    tracking = given.tracking
+    which = given.tracking.stations_of(given.problem)
+    labels = [given.measured.labels[given.problem.stations[s].name] for s in which]
+    seen: set[tuple[object, ...]] = set()
+    out = np.zeros(len(given.rows), dtype=np.bool_)
+    sensors = [given.problem.stations[s].sensor for s in which]
+    values = np.nan_to_num(tracking.values, nan=-1.25e300)
+    for i, t in enumerate(tracking.row_times.tolist()):
+        key = (t, labels[i], sensors[i], *values[i].tolist())
+        out[i] = key in seen and bool((given.rows[i] >= 0).any())
+        seen.add(key)
+    return out

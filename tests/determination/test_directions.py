@@ -1,0 +1,89 @@
+"""Directions and rates as parts of a problem: pairs, noise, what is asked for; and a real pass of one radar."""
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi import earth
+from piazzi.determination import measured
+from piazzi.formats import Observations, Segment
+
+EPOCH = pz.Epoch("2016-02-13T12:00:00 UTC")
+SITE = earth.Station.geodetic("RADAR", 0.4, 1.0, 100.0)
+
+
+def rows(kinds, t, sigma=1e-4, **segment):
+    kind = np.array([sorted(set(kinds)).index(k) for k in kinds])
+    return Observations(
+        epoch=EPOCH,
+        t=t,
+        value=np.linspace(0.1, 0.9, len(t)),
+        kinds=tuple(sorted(set(kinds))),
+        kind=kind,
+        participants=("RADAR", "SAT"),
+        station=0,
+        object=1,
+        segments=(Segment("UTC", **segment),),
+        sigma=sigma,
+        correlation=np.where(np.arange(len(t)) % 2 == 1, 0.5, np.nan),
+        tag=3,
+    )
+
+
+def test_azimuth_and_elevation_of_one_time_are_one_row():
+    found = measured(rows(["azimuth", "elevation"] * 3, np.repeat([0.0, 10.0, 20.0], 2)), [SITE])
+    assert found.tracking.values.shape == (3, 2) and (found.rows >= 0).all()
+    noise = np.asarray(found.stations[0].noise)
+    assert noise == pytest.approx(1e-8 * np.array([[1.0, 0.5], [0.5, 1.0]]))
+    assert any("free of refraction" in text for text in found.assumed)
+
+
+def test_a_direction_with_one_angle_has_the_other_missing():
+    found = measured(rows(["right_ascension", "declination", "declination"], [0.0, 0.0, 5.0], angles="astrometric"), [SITE])
+    assert np.isnan(found.tracking.values).sum() == 1 and found.rows[1].tolist()[0] == -1
+
+
+@pytest.mark.parametrize(
+    ("kinds", "told", "says"),
+    [
+        (["right_ascension", "declination"], {}, "--angles"),
+        (["range_rate_averaged"] * 2, {"way": "two-way", "range_is": "half"}, "--interval"),
+        (["range_rate_averaged"] * 2, {"way": "two-way", "range_is": "half", "interval": 10.0}, "--interval-reference"),
+        (["doppler"] * 2, {}, "doppler is not determined from yet"),
+    ],
+)
+def test_what_is_open_is_asked_for(kinds, told, says):
+    with pytest.raises(ValueError, match=says):
+        measured(rows(kinds, [0.0, 0.0], **told), [SITE])
+
+
+def test_rates_have_their_count():
+    told = {"way": "two-way", "range_is": "half", "interval": 30.0, "interval_reference": "end"}
+    found = measured(rows(["range_rate_averaged"] * 2, [0.0, 60.0], **told), [SITE])
+    assert found.stations[0].numbers["count"] == 30.0
+    assert len(measured(rows(["range_rate"] * 2, [0.0, 60.0], way="two-way", range_is="half"), [SITE]).stations) == 1
+
+
+@pytest.mark.slow
+def test_geos_3_by_one_radar(data_dir, tmp_path):
+    """The first pass of Vallado's example 10-4: within 200 m and 3.5 m/s of the book's answer."""
+    (tmp_path / "kaena.toml").write_text("""[[stations]]
+name = "932"
+latitude = 21.572056
+longitude = -158.266578
+height = "300.2 m"
+bias = { range = 80.0, azimuth = "0.0081 deg", elevation = "0.0045 deg" }
+sigma = { range = 92.5, azimuth = "0.0224 deg", elevation = "0.0139 deg" }
+""")
+    guess = "x=5975.2904km y=2568.6400km z=3120.5845km vx=3.983846km/s vy=-2.071159km/s vz=-5.917095km/s"
+    found = pz.determine(
+        data_dir / "earth" / "geos3" / "GEOS6a.INP",
+        stations=[tmp_path / "kaena.toml"],
+        guess=f"{guess} epoch=1995-01-29T02:38:37Z frame=EME2000",
+        epoch="1995-01-29T02:38:37 UTC",
+        frame="EME2000",
+    )
+    assert found.determined
+    book = np.array([5748607.0, 2679932.4, 3442790.2, 4330.460, -1922.874, -5726.562])
+    off = found.orbit.at() - book
+    assert np.linalg.norm(off[:3]) < 200.0 and np.linalg.norm(off[3:]) < 3.5
