@@ -156,13 +156,13 @@ def _answered(given: Setup, estimator: Estimator) -> tuple[Array, Array, Estimat
     robust = getattr(estimator, "loss", None) is not None  # it weighs rows itself
     if first is not None and not robust:
         keep, reasons = edited(given, first)
-    for _ in range(ROUNDS):
+    for left in reversed(range(ROUNDS)):
         answer = estimate(given, estimator, keep)
         analysis = _analysis_at(given, answer.mean) if answer.view == "delayed" else first
         if analysis is None or robust or answer.view != "delayed":
             break
         again, why = edited(given, analysis, keep)
-        if (again == keep).all():
+        if not left or (again == keep).all():
             break
         keep, reasons = again, why
     return keep, reasons, answer, analysis
