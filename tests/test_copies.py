@@ -11,6 +11,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import piazzi as pz
+from tests.determination.fixing import observations as fixes
 
 HOW = {"copy": copy.copy, "deepcopy": copy.deepcopy, "pickle": lambda value: pickle.loads(pickle.dumps(value))}
 LIVE = {
@@ -53,6 +54,14 @@ def arc():
         epoch=pz.Epoch("2020-01-01 UTC"), t=[0.0, 1.0], position=np.ones((2, 3)), covariance_frames=("RTN",),
         covariance_t=[0.0], covariance=np.eye(6)[None], frame="GCRF",
     )  # fmt: skip
+
+
+def determined():
+    """Of four exact fixes of a circle, by two-body motion."""
+    t = np.array([0.0, 300.0, 600.0, 900.0])
+    a = t * np.sqrt(3.986004415e14 / 7e6**3)
+    place = 7e6 * np.stack([np.cos(a), np.sin(a), 0.0 * a], -1)
+    return pz.determine(fixes(place, t, 1.0), forces="none")
 
 
 def samples():
@@ -100,6 +109,10 @@ def samples():
     results = [estimate, estimate.predict([9.0]), pz.compare(problem, tracking, {"ekf": settings[1]}), prediction]
     results += [pz.observability(problem, tracking), pz.windows(problem, tracking, [2, 3])]
     results += [pz.update(problem, prediction, "east", [3.0]), pz.Study.of("b612-range", runs=2)]
+    thrust = "def thrust(t):\n    return (2.0 * t,)\n\n\ndef thrust_partials(t):\n    return (2.0 * t, 2.0)\n"
+    others += [pz.Interpolation([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 0.5, 0.2]), pz.InitialOrbits((), 0, 0), pz.Estimated("cr")]
+    others += [pz.Function(thrust, arguments=1)]
+    results += [pz.propagate(problem, [10.0, 11.0]), determined()]
     found = [problem, tracking, *settings, *steps, *sessions, *parts, *others, *results]
     return {type(value).__name__: value for value in found}
 

@@ -114,17 +114,21 @@ def command(
     show: bool,
     **answers: Any,
 ) -> int:
-    """Determine an orbit from TRACKING, with its covariance and a verdict.
+    """Determine an orbit from TRACKING.
 
-    Takes files as `piazzi tracking` shows them. What they leave open is asked for by the option that says it, and what was
-    assumed is listed. Without --guess all orbits that fit are looked for.
+    The answer has a covariance and a verdict with a test behind each sentence.
+    Files are taken as `piazzi tracking` shows them. What they leave open is asked
+    for by the option that says it, and what was assumed is listed. Without
+    --guess all orbits that fit are looked for.
 
     Examples:
       piazzi determine fixes.oem -o orbit.oem
-      piazzi determine precise.sp3 --object G01 --with graph --with batch --report out
-      piazzi determine lageos2.npt --stations SLRF2014.snx --guess "x=7526990m y=-9646310m z=1464110m vx=3033m/s vy=1715m/s
-        vz=-4447m/s epoch=2016-02-13T16:00:00Z frame=EME2000"
-      piazzi determine night.tdm --guess old.tle --span "first .. last+3d" -o next.oem --json
+      piazzi determine precise.sp3 --object G01 --with graph --with batch
+      piazzi determine lageos2.npt --stations SLRF2014.snx --report l2.html
+      piazzi determine lageos2.npt --stations ilrs --guess "x=7527km y=-9646km
+        z=1464km vx=3.03km/s vy=1.72km/s vz=-4.45km/s
+        epoch=2016-02-13T16:00:00Z frame=EME2000"
+      piazzi determine night.tdm --span "first .. last+3d" -o next.oem --json
 
     Exit status: 0 determined, 2 bad usage or input, 3 not determined.
     """

@@ -18,7 +18,7 @@ from piazzi.problem.checks import Array
 OUT, BACK = 1.0 - exp(-4.0), 1.0 - exp(-3.5)  # chi-square of 8 and 7 with two degrees of freedom
 SPARE = 8  # values beyond the unknowns, below which nothing is left out
 ROUNDS = 20
-MOST = 0.2  # of the rows: beyond, it is no edit but a verdict
+MOST = 0.2  # of the rows: so many are not left out
 FLOOR = 1e-6  # of a variance: a row that alone determines something has no residual
 OUTLIER, STATION, DUPLICATE = "outlier", "wrong station", "duplicate"
 
@@ -46,6 +46,10 @@ def edited(given: Setup, analysis: Analysis, keep: Array | None = None) -> tuple
         if not keep[own].any() and own.sum() > 1:
             reasons[own] = STATION
     reasons[repeated] = DUPLICATE
+    odd = reasons == OUTLIER
+    if odd.sum() > MOST * some.sum():  # so many are no outliers: the model does not hold, and the verdict says so
+        keep = keep | odd
+        reasons[odd] = ""
     return keep, reasons
 
 

@@ -61,6 +61,9 @@ class Guess:
         if float(np.linalg.norm(np.cross(self.position, self.velocity))) < 1e-3 * distance:
             raise ValueError(f"{self.source}: it moves along a straight line through the centre of the Earth")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.epoch, self.position, self.velocity, self.source, self.assumed, self.orbits)
+
     @property
     def state(self) -> Array:
         """Position and velocity, (6,)."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.analysis import Analysis
-from piazzi.determination.editing import MOST, OUTLIER, STATION
+from piazzi.determination.editing import STATION
 from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate
@@ -157,9 +157,6 @@ def honest(given: Setup, analysis: Analysis | None, keep: Array, reasons: Array)
     if wrong:
         names = ", ".join(wrong)
         return Sentence(False, None, test, f"Not honest: all measurements of {names} contradict those of the others.")
-    share = float(np.mean(reasons[np.isfinite(analysis.whitened).any(axis=1)] == OUTLIER))
-    if share > MOST:
-        return Sentence(False, None, test, f"Not honest: {share:.0%} of the measurements do not fit the others.")
     whitened = analysis.whitened[keep]
     squares = whitened[np.isfinite(whitened)] ** 2
     free = len(squares) - given.problem.model.n + len(analysis.prior_miss)
