@@ -303,6 +303,7 @@ def test_whole_number_of_steps_stays_whole():
 def test_kernels_that_are_loaded_stay_loaded_however_many_kinds_of_problems_come(monkeypatch):
     """Kinds for which no kernel was wanted are forgotten."""
     monkeypatch.setattr("piazzi.problem.evaluation._SPECS", kinds := {})
+    monkeypatch.setattr("piazzi.problem.evaluation._ROOM", [MOST_KINDS])
 
     def kind(i):
         model = pz.Model(["x"], [f"-{i}*x"], [pz.Sensor("position", ["x"])])

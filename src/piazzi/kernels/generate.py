@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 
 SIDE = "p.sides[{}]"  # of an event, where the integrator knows it
 
+_ITERATION = re.compile(r"^ +for _ in range\(\d+\):$", re.M)  # as printed for a root
+_BRANCHING = re.compile(r"(?<![\w.])(sin|cos|tan|exp|log)\(")
+
 
 def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
     """Source of the sizes, dynamics, step and sensors; `lanes` problems are worked on at once where there are that many."""
@@ -67,7 +70,20 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
     if model.looks_elsewhen:
         parts.append(re.sub(r"\bsubstep", "elsewhen", runge_kutta_source(*DORMAND_PRINCE_8, rule=False, long=model.reads_data)))
     parts.append(_sensor_source(model))
-    return "".join(parts)
+    return _apart("".join(parts))
+
+
+def _apart(source: str) -> str:
+    """The source with the functions that branch called, not inlined, where roots are iterated.
+
+    Copies of them one behind the other, each with a branch, are followed by the compiler along every path: 2 to the power of
+    the number of steps of the iteration.
+    """
+    if not _ITERATION.search(source):
+        return source
+    called = sorted({*_BRANCHING.findall(source)})
+    source = _BRANCHING.sub(r"apart_\1(", source)
+    return "".join(_inline(f"apart_{name}(a)", f"return {name}(a)", mark="outlined") for name in called) + source
 
 
 def _arguments(model: Model, extra: Sequence[str] = (), beside: str = "") -> tuple[list[str], dict[sp.Symbol, str], str]:

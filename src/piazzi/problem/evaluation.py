@@ -18,15 +18,17 @@ from piazzi.model.values import with_values
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.parts import Station
 
-MOST_KINDS = 100  # beyond so many kinds of problem, those are forgotten for which no kernel was wanted
+MOST_KINDS = 100  # for which no kernel was wanted yet: of so many more kinds of problem, these are forgotten
+_ROOM = [MOST_KINDS]
 _SPECS: dict[tuple[Any, ...], dict[tuple[Any, ...], KernelSpec]] = {}
 
 
 def shared_specs(kind: tuple[Any, ...]) -> dict[tuple[Any, ...], KernelSpec]:
     """Specifications of kernels so far for problems of a kind, to which whoever needs another adds it."""
-    if len(_SPECS) > MOST_KINDS:  # the others stay: what is loaded is found by them, and stays too
+    if len(_SPECS) > _ROOM[0]:  # the others stay: what is loaded is found by them, and stays too
         for idle in [other for other, specs in list(_SPECS.items()) if not specs]:
             _SPECS.pop(idle, None)
+        _ROOM[0] = len(_SPECS) + MOST_KINDS
     return _SPECS.setdefault(kind, {})
 
 
