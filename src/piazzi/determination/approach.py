@@ -15,8 +15,8 @@ import numpy as np
 
 from piazzi.determination.analysis import analysed
 from piazzi.determination.guesses import MU
-from piazzi.determination.orbit_forces import turning
 from piazzi.determination.setup import Setup, follow, scale_of, with_prior
+from piazzi.earth.stepping import turning
 from piazzi.evaluate.information import factor
 from piazzi.orbit import ModifiedEquinoctial
 from piazzi.problem.checks import Array
@@ -55,7 +55,7 @@ def approached(given: Setup) -> Setup:
     before = first
     away = np.abs(given.tracking.row_times - begun)
     there = np.isfinite(given.tracking.values)
-    half = pi / turning(first[:6])
+    half = pi / turning(first[:3], first[3:6])
     while True:
         rows = away <= half
         whole = bool(rows.all())

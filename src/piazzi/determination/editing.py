@@ -74,7 +74,7 @@ def _settled(given: Setup, analysis: Analysis, keep: Array, repeated: Array, the
 
 def _squared(analysis: Analysis, keep: Array, unit: Array, there: Array) -> Array:
     """Squares (J,) of residuals after a fit of the rows to keep, in units of what they should be like."""
-    J, m, n = analysis.rows.shape
+    _, m, n = analysis.rows.shape
     rows = np.nan_to_num(analysis.rows) * unit
     w = np.nan_to_num(analysis.whitened)
     A = np.vstack([rows[keep].reshape(-1, n), analysis.prior * unit])
@@ -84,8 +84,7 @@ def _squared(analysis: Analysis, keep: Array, unit: Array, there: Array) -> Arra
     root: Array = np.asarray(np.linalg.qr(A, mode="r"))
     if np.abs(np.diag(root)).min() <= 1e-12 * np.abs(np.diag(root)).max():
         return np.asarray((left**2).sum(axis=1))
-    solved = np.linalg.solve(root.T, rows.reshape(-1, n).T).T.reshape(J, m, n)
-    spread = solved @ np.swapaxes(solved, 1, 2)
+    spread = analysis.leverage(root, unit)
     expected = np.eye(m) + np.where(keep[:, None, None], -spread, spread)
     values, vectors = np.linalg.eigh(np.where(there[:, :, None] & there[:, None, :], expected, np.eye(m)))
     turned = np.einsum("jik,ji->jk", vectors, np.where(there, left, 0.0))

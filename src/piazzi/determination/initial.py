@@ -161,7 +161,7 @@ def _refined(
 
 
 def _fit(problem: Problem, tracking: Tracking, keep: Array, state: Array) -> tuple[Estimate, _Refined] | None:
-    times, constants = tracking.row_times[keep], problem.model.n - 6
+    times = tracking.row_times[keep]
     sigma = np.concatenate([np.full(3, WIDE * np.linalg.norm(state[:3])), np.full(3, WIDE * np.linalg.norm(state[3:]))])
     few = Tracking(times, tracking.values[keep], tracking.row_stations[keep], epoch=tracking.epoch)
     start = np.concatenate([state, problem.mean[6:]])
@@ -171,7 +171,7 @@ def _fit(problem: Problem, tracking: Tracking, keep: Array, state: Array) -> tup
         estimate = BatchLeastSquares(start=start, max_iterations=30, tolerance=1e-3).estimate(posed, few)
     except ValueError:
         return None
-    if not estimate.success or constants < 0:
+    if not estimate.success:
         return None
     square, count = _square(posed, few, estimate)
     epoch = problem.epoch + float(estimate.times[0])

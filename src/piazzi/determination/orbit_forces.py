@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import pi
 from typing import Any
 
-import numpy as np
-
 from piazzi.earth import ForceChoice, Forces, LaserSphere, laser_sphere, read_forces
-from piazzi.earth.constants import GM
 from piazzi.earth.defaults import AIR_BELOW, lowest_height
 from piazzi.earth.force_options import CONSTANT
-from piazzi.orbit import Keplerian
+from piazzi.earth.stepping import longest_step
 from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
 
@@ -79,7 +75,7 @@ def chosen_forces(
         left_out["density"] = "air does not follow the activity of the Sun from day to day, which may be half of the drag"
     elif lowest_height(state[:3], state[3:]) < AIR_BELOW and not forces.drag:
         left_out["drag"] = "there is air at this height, and no drag among the forces"
-    return Chosen(choice, roles, values, facts, 2.0 * pi / (STEPS * turning(state)), left_out, assumed)
+    return Chosen(choice, roles, values, facts, longest_step(state[:3], state[3:6], STEPS), left_out, assumed)
 
 
 def _choice(given: Any, state: Array) -> ForceChoice:
@@ -91,12 +87,6 @@ def _choice(given: Any, state: Array) -> ForceChoice:
         return read_forces("default" if given is None else str(given), lowest_height(state[:3], state[3:]))
     except ValueError as error:
         raise ValueError(f"--forces: {str(error).removeprefix('forces: ')}") from None
-
-
-def turning(state: Array) -> float:
-    """Rate of turning at the pericentre, rad/s."""
-    p, e = (float(x) for x in Keplerian(size="p").from_state(state[:3], state[3:], GM["earth"])[:2])
-    return float(np.sqrt(GM["earth"] * p)) / (p / (1.0 + e)) ** 2
 
 
 def _coefficients(

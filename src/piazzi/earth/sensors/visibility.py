@@ -11,7 +11,6 @@ from piazzi.earth.geodetic import ELLIPSOIDS
 from piazzi.earth.sensors.air import Air
 from piazzi.earth.sensors.text import AXES, names
 
-RULES = ("above", "dark", "sunlit")
 NIGHT = radians(-12.0)  # of the Sun's elevation: the end of nautical twilight
 
 
