@@ -12,6 +12,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis, analysed
 from piazzi.determination.approach import approached
+from piazzi.determination.case import Case
 from piazzi.determination.editing import edited
 from piazzi.determination.fit import estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
@@ -78,51 +79,45 @@ def determine(
     ValueError
         For what is wrong with the input or open, with the option that says it.
     """
+    words = {name: value for name, value in locals().items() if name not in ("tracking", "announce", "notes", "conventions")}
+    return determined(tracking, Case.of({**words, **conventions}), announce, notes)
+
+
+def determined(
+    tracking: Sequence[Any],
+    case: Case,
+    announce: Callable[[str], None] | None = None,
+    notes: Mapping[str, Any] | None = None,
+) -> Determination:
+    """What `determine` returns, of a case."""
     say = announce or (lambda step: None)
-    chosen = estimators(with_)
-    scale, _ = _instant(epoch)
-    axes = frame_named(frame) if frame else "GCRF"
+    chosen = estimators(case.with_)
+    scale, _ = _instant(case.epoch)
+    axes = frame_named(case.frame) if case.frame else "GCRF"
     say("reading")
-    given = prepared(
-        *tracking, guess=guess, stations=stations, forces=forces, estimate=estimate, consider=consider, mass=mass, area=area,
-        com=com, epoch=epoch, frame=frame, object=object, **conventions,
-    )  # fmt: skip
+    given = prepared(*tracking, case=case)
     say("approaching")
     return solved(approached(given), chosen, axes, scale, say, notes or {})
 
 
-def prepared(
-    *tracking: Any,
-    guess: Any = None,
-    stations: Any = None,
-    forces: Any = "default",
-    estimate: Any = (),
-    consider: Any = (),
-    mass: float | None = None,
-    area: float | None = None,
-    com: float | None = None,
-    epoch: Any = None,
-    frame: str | None = None,
-    object: str | None = None,  # noqa: A002
-    **conventions: Any,
-) -> Setup:
-    """The problem and tracking that `determine` solves, from the same words; raises as it does."""
-    _, at = _instant(epoch)
-    told = dict(conventions) | ({"frame": frame} if frame else {})
-    rows = of_object(_observations(tracking, told), object)
-    seen = measured(rows, stations, com=com, corrections=told.get("corrections"))
+def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
+    """The problem and tracking that `determine` solves, of a case or of the same words; raises as it does."""
+    case = Case.of(words) if case is None else case
+    _, at = _instant(case.epoch)
+    rows = of_object(_observations(tracking, case.answers), case.object)
+    seen = measured(rows, case.stations, com=case.com, corrections=case.answers.get("corrections"))
 
     def chosen(orbit: Guess) -> Chosen:
-        found = chosen_forces(forces, orbit.state, name=seen.object, mass=mass, area=area)
-        return considered(estimated(found, estimate, seen), consider, seen)
+        found = chosen_forces(case.forces, orbit.state, name=seen.object, mass=case.mass, area=case.area)
+        return considered(estimated(found, case.estimate, seen), case.consider, seen)
 
-    begin = _guess(guess, seen, object) or unguided(seen, lambda first: posed(seen, chosen(first), first))
+    begin = _guess(case.guess, seen, case.object) or unguided(seen, lambda first: posed(seen, chosen(first), first))
     return setup(seen, chosen(begin), begin, at=at)
 
 
-def objects_in(tracking: Sequence[Any], frame: str | None, told: Mapping[str, Any]) -> list[str | None]:
+def objects_in(tracking: Sequence[Any], case: Case) -> list[str | None]:
     """Names of all objects of files."""
-    return list(_observations(tracking, dict(told) | ({"frame": frame} if frame else {})).objects) or [None]
+    return list(_observations(tracking, case.answers).objects) or [None]
 
 
 def solved(
