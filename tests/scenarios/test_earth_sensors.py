@@ -6,6 +6,7 @@ import pytest
 import piazzi as pz
 from piazzi import earth
 from piazzi.model.values import with_values
+from piazzi.problem.truth import true_problem
 from piazzi.scenarios import check, load_scenario
 from piazzi.scenarios.write import problem_from_tables, problem_to_tables
 from tests.references.drawn import same_problem
@@ -78,6 +79,19 @@ def test_tables_give_the_problem_back_with_its_places(tmp_path):
     assert again.model is problem.model and again.checksums == problem.checksums
 
 
+def test_a_station_may_really_stand_elsewhere(tmp_path):
+    moved = "[truth.stations.a]\nmoved = { up = 3.0, north = '-4 m', east = 0.012 }\nmask = 8.0\n"
+    problem = load_scenario(written(tmp_path, TEXT + moved)).problem
+    world = true_problem(problem)
+    believed, there = (p.stations[0].place.station.position(problem.epoch) for p in (problem, world))
+    up, north, east = earth.stations.up_north_east(believed)
+    np.testing.assert_allclose(there - believed, 3.0 * up - 4.0 * north + 0.012 * east, atol=1e-8)
+    assert world.stations[0].numbers["mask"] == np.radians(8.0)
+    assert world.stations[1].place is problem.stations[1].place
+    again = problem_from_tables(problem_to_tables(problem), problem.name, "here")
+    assert true_problem(again).checksums == world.checksums != problem.checksums
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -89,6 +103,9 @@ def test_tables_give_the_problem_back_with_its_places(tmp_path):
         ("latitude = 54.4, ", "", "latitude missing"),
         ("mask = 5.0 }", "mast = 5.0 }", "unknown key 'mast'"),
         ("humidity = 0.3", "humidity = 30.0", "percent"),
+        ("[times]", "[truth.stations.a]\nmoved = { down = 3.0 }\n[times]", "truth.stations.a.moved.down"),
+        ("[times]", "[truth.stations.a]\nmoved = { up = '3 kg' }\n[times]", "truth.stations.a.moved.up"),
+        ("[times]", "[truth.stations.d]\nmoved = { up = 3.0 }\n[times]", "truth.stations.d: is no station"),
         ('numbers = { mask = "10 deg" }', 'numbers = { mast = "10 deg" }', "names 'mast', which no equation uses"),
         ("[earth]\ndegree = 2", "[earth]\ndegree = 2\nbodies = []\ntides = []", ""),
     ],

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -147,6 +147,14 @@ class Station:
             return marker
         une = np.array([(e.up, e.north, e.east) for e in offsets])[_latest(offsets, seconds)]
         return np.asarray(marker + np.einsum("...ij,...i->...j", up_north_east(marker), une))
+
+    def moved(self, up: float = 0.0, north: float = 0.0, east: float = 0.0) -> Station:
+        """The station so many metres away."""
+        une = np.array([up, north, east])
+        there = [c.position + une @ up_north_east(np.array(c.position)) for c in self.coordinates]
+        return replace(
+            self, coordinates=tuple(replace(c, position=tuple(p)) for c, p in zip(self.coordinates, there, strict=True))
+        )
 
     def place(self, epoch: Epoch = J2000, ellipsoid: str | tuple[float, float] = "WGS84") -> tuple[float, float, float]:
         """Latitude, longitude (rad) and height above the ellipsoid (m) of the instrument at a date."""

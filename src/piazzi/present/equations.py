@@ -68,5 +68,6 @@ def _differences(truth: Truth) -> Iterator[str]:
     lines += [f"{name} = {value:.9g}" for name, value in truth.parameters.items()]
     lines += [f"{name}: {_told(recipe)}" for name, recipe in truth.functions.items()]
     lines += [f"{key} of {name} = {value:.9g}" for name, numbers in truth.stations.items() for key, value in numbers.items()]
+    lines += [f"station {name} stands elsewhere" for name in truth.places]
     if lines:
         yield from ("", "# what is true instead", *lines)

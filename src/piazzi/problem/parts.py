@@ -174,6 +174,8 @@ class Truth:
         True data of functions that differ, or further functions.
     stations : mapping of a station's name to numbers by name
         True numbers of stations that differ.
+    places : mapping of a station's name to its place
+        True places of stations that differ, as `Station.place` is.
     """
 
     state: Any = None
@@ -187,3 +189,4 @@ class Truth:
     definitions: Mapping[str, Any] = field(default_factory=dict)
     functions: Mapping[str, Any] = field(default_factory=dict)
     stations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    places: Mapping[str, Any] = field(default_factory=dict)

@@ -67,9 +67,12 @@ def _true_model(model: Model, truth: Truth) -> Model:
 
 
 def _true_stations(stations: Sequence[Station], truth: Truth) -> list[Station]:
-    """The stations with their true numbers."""
+    """The stations with their true numbers, where they really are."""
     names = [station.name for station in stations]
-    for name in truth.stations:
+    for name in (*truth.stations, *truth.places):
         if name not in names:
-            raise ValueError(f"the truth has numbers of {name!r}, which is no station{nearest(name, names)}")
-    return [replace(s, numbers={**s.numbers, **truth.stations.get(s.name, {})}) for s in stations]
+            raise ValueError(f"the truth has numbers or a place of {name!r}, which is no station{nearest(name, names)}")
+    return [
+        replace(s, numbers={**s.numbers, **truth.stations.get(s.name, {})}, place=truth.places.get(s.name, s.place))
+        for s in stations
+    ]

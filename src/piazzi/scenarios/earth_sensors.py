@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from piazzi.model import Sensor
 from piazzi.model.definitions import Definition
 from piazzi.model.functions import ROOT
-from piazzi.scenarios.table import Table, shown
+from piazzi.scenarios.quantities import quantity
+from piazzi.scenarios.table import Faults, Table, shown
 from piazzi.text import nearest
 from piazzi.units import ONE, Unit, Units
 
@@ -22,6 +24,7 @@ KINDS = (
     "radar_doppler",
 )  # fmt: skip
 DIMENSIONS = {"m": "length", "m/s": "length/time", "rad": "angle"}
+AXES = ("up", "north", "east")
 PLACE = ("site", "place", "weather", "tides")
 
 
@@ -95,6 +98,22 @@ def read_place(table: Table, instrument: Instrument | None, epoch: Epoch | None)
         usual = dict(instrument.defaults)
         return {key: value for key, value in found["numbers"].items() if value != usual[key]}, found["place"]
     return {}, None
+
+
+def read_true_place(table: Table, entry: Table, instrument: Instrument | None, epoch: Epoch | None) -> Any:
+    """Where a station really is: ``place``, or ``moved`` off what its entry says; None where it is there."""
+    if "place" in table:
+        return read_place(table, instrument, epoch)[1]
+    if "moved" not in table:
+        return None
+    inner = table.table("moved")
+    off = {key: quantity(inner, key, Units(), "length") or 0.0 for key in AXES}
+    inner.finish(AXES)
+    _, place = read_place(Table(entry.data, entry.path, Faults()), instrument, epoch)  # its faults are noted already
+    if not hasattr(place, "station"):
+        table.fault("moved", "is of a station with a site, whose sensor has a kind")
+        return None
+    return replace(place, station=place.station.moved(**off))
 
 
 def _site(table: Table) -> Any:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from piazzi.model.pruning import redefined
 from piazzi.scenarios.earth import definitions_of, dynamics_of, names_of, read_earth, unit_of
+from piazzi.scenarios.earth_sensors import read_true_place
 from piazzi.scenarios.equations import Physics, equation
 from piazzi.scenarios.functions import read_functions
 from piazzi.scenarios.table import Table
@@ -27,6 +28,7 @@ class TruePhysics:
     definitions: dict[str, str] = field(default_factory=dict)
     functions: dict[str, Any] = field(default_factory=dict)
     stations: dict[str, dict[str, float]] = field(default_factory=dict)
+    places: dict[str, Any] = field(default_factory=dict)
 
 
 def read_true_physics(file: Table, table: Table, physics: Physics, units: Units, epoch: Epoch | None) -> TruePhysics:
@@ -58,7 +60,7 @@ def read_true_physics(file: Table, table: Table, physics: Physics, units: Units,
             equations[0].fault(state, f"is no state{nearest(state[:60], physics.states)}")
     _collect(out, physics, forces, rates, definitions)
     out.parameters |= _numbers(own, physics, forces, further, units)
-    out.stations = _stations(table.table("stations"), file, physics)
+    out.stations, out.places = _stations(table.table("stations"), file, physics, epoch)
     return out
 
 
@@ -111,17 +113,23 @@ def _numbers(
     return out
 
 
-def _stations(table: Table, file: Table, physics: Physics) -> dict[str, dict[str, float]]:
-    """True numbers of stations, by their names."""
+def _stations(
+    table: Table, file: Table, physics: Physics, epoch: Epoch | None
+) -> tuple[dict[str, dict[str, float]], dict[str, Any]]:
+    """True numbers of stations, and where they really are, by their names."""
+    entries = {str(e.data.get("name")): e for e in file.array("stations")}
     sensors = list(physics.numbers)
-    entries = {str(e.data.get("name")): e.data.get("sensor", sensors[0] if sensors else None) for e in file.array("stations")}
-    out = {}
+    numbers: dict[str, dict[str, float]] = {}
+    places: dict[str, Any] = {}
     for name, inner in table.tables():
         if name not in entries:
             table.fault(name, f"is no station{nearest(name[:60], entries)}")
             continue
-        own = physics.numbers.get(str(entries[name]), {})
+        sensor = str(entries[name].data.get("sensor", sensors[0] if sensors else None))
+        own = physics.numbers.get(sensor, {})
+        place = read_true_place(inner, entries[name], physics.instruments.get(sensor), epoch)
         found = {key: inner.number(key, own[key].factor) for key in inner.data if key in own}
-        inner.finish(own)
-        out[name] = {key: value for key, value in found.items() if value is not None}
-    return out
+        inner.finish((*own, "moved", "place"))
+        numbers[name] = {key: value for key, value in found.items() if value is not None}
+        places |= {} if place is None else {name: place}
+    return numbers, places

@@ -48,7 +48,7 @@ def read_truth(file: Table, physics: Physics, prior: Gaussian | None, units: Uni
     table.finish()
     return Truth(
         mean, true.parameters, noise, integrator, bool(noisy), manoeuvres, accept,
-        true.dynamics, true.definitions, true.functions, true.stations,
+        true.dynamics, true.definitions, true.functions, true.stations, true.places,
     )  # fmt: skip
 
 

@@ -149,8 +149,11 @@ def _truth(truth: Truth, whole: bool) -> dict[str, Any]:
             out[key] = {left: str(text) for left, text in texts.items()}
     if truth.functions:
         out["functions"] = {name: write_function(f) if whole else f.checksum for name, f in truth.functions.items()}
-    if truth.stations:
-        out["stations"] = {name: {k: float(v) for k, v in numbers.items()} for name, numbers in truth.stations.items()}
+    if truth.stations or truth.places:
+        stations: dict[str, Any] = {name: {k: float(v) for k, v in of.items()} for name, of in truth.stations.items()}
+        for name, place in truth.places.items():
+            stations.setdefault(name, {})["place"] = write_place(place) if whole else place.checksum
+        out["stations"] = stations
     if truth.accept:
         out["accept"] = list(truth.accept)
     if truth.state is not None:
