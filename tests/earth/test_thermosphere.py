@@ -112,3 +112,53 @@ def test_what_is_missing_is_said(weather, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymsis", None)
     with pytest.raises(ValueError, match=r"pip install 'piazzi\[msis\]'"):
         earth.Thermosphere(EPOCH, X + 1.0, weather).value(0.0)
+
+
+SCENARIO = """
+epoch = "2015-03-17T03:30:00 UTC"
+[earth]
+degree = 2
+drag = "msis"
+weather = "{weather}"
+[parameters]
+cd_a_m = 0.01
+[sensors.position.components]
+px = "x"
+[[stations]]
+name = "fixes"
+noise = {{ sigma = 1.0 }}
+[prior]
+mean = {mean}
+sigma = [10.0, 10.0, 10.0, 0.01, 0.01, 0.01]
+time = 1800.0
+[times]
+start = 1800.0
+step = 60.0
+count = 3
+[truth.earth]
+drag = "harris-priester"
+"""
+
+
+def test_a_scenario_names_its_space_weather(weather, tmp_path, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    path = tmp_path / "storm.toml"
+    path.write_text(SCENARIO.format(weather=weather.name, mean=X.tolist()))
+    problem, _ = pz.load(path)
+    air = earth.Thermosphere(EPOCH, X, weather)  # the same arc, from an epoch half an hour later
+    np.testing.assert_allclose(problem.functions["air"].value(2000.0), air.value(200.0), rtol=1e-3)
+    assert "air" in problem.truth.functions
+    path.write_text(SCENARIO.format(weather="nowhere.csv", mean=X.tolist()))
+    with pytest.raises(ValueError, match=r"earth\.weather: .*nowhere.csv: No such file"):
+        pz.load(path)
+
+
+def test_space_weather_is_looked_for_where_data_are(weather, tmp_path, monkeypatch):
+    choice = earth.read_forces("degree=2 drag=msis", 4e5)
+    monkeypatch.setenv("PIAZZI_EARTH", str(tmp_path))
+    np.testing.assert_array_equal(choice.air(EPOCH, X).value(0.0), earth.Thermosphere(EPOCH, X, weather).value(0.0))
+    monkeypatch.setenv("PIAZZI_EARTH", str(tmp_path / "empty"))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "empty"))
+    with pytest.raises(ValueError, match="drag 'msis' needs space weather: give weather=FILE, or get it by: piazzi data get"):
+        choice.air(EPOCH, X)
+    assert earth.read_forces("degree=2", 4e5).air(EPOCH, X) is None

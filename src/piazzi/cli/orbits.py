@@ -80,7 +80,7 @@ def course_of(text: str, forces: str | None, begin: str | None, chosen: str | No
         prior_time=0.0,
         name=start.name,
         epoch=start.epoch,
-        functions=choice.functions(start.epoch),
+        functions=choice.functions(start.epoch, choice.air(start.epoch, start.state)),
     )
     return Course(start.name, problem, start.source, str(choice), choice.assumed, True, start.covariance is not None)
 

@@ -96,13 +96,14 @@ def posed(
     every = {**chosen.roles, **own, **(roles or {})}
     numbers = {**chosen.values, **{name: value for name, (_, value) in measured.parameters.items()}, **(values or {})}
     model = chosen.forces.model(measured.sensors, every, functions=measured.functions)
+    air = chosen.choice.air(measured.epoch, guess.state[:6], guess.epoch - measured.epoch)
     return Problem(
         model,
         _prior(guess.state),
         stations=measured.stations,
         parameters=numbers,
         integrator=RungeKutta8(max_step=chosen.max_step),
-        functions={**chosen.choice.functions(measured.epoch), **measured.functions},
+        functions={**chosen.choice.functions(measured.epoch, air), **measured.functions},
         epoch=measured.epoch,
         name=measured.object,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from math import ceil, log, sqrt
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,11 @@ import numpy as np
 from piazzi.earth.constants import GM
 from piazzi.earth.eop import EOP, read_eop
 from piazzi.earth.epoch import Epoch
-from piazzi.earth.finding import check_kernel
+from piazzi.earth.finding import check_kernel, found
 from piazzi.earth.forces import Forces
 from piazzi.earth.scales import Orientation
+from piazzi.earth.space_weather import SpaceWeather, read_space_weather
+from piazzi.earth.thermosphere import Thermosphere
 from piazzi.earth.tides import RADIUS
 from piazzi.opening import opened
 from piazzi.text import nearest
@@ -30,7 +32,7 @@ REFLECTED, DRAGGED = 0.013, 0.022  # m2/kg: coefficients 1.3 and 2.2 on 0.01 m2/
 NO = ("no", "none", "off", "false")
 YES = ("yes", "on", "true")
 LARGEST = 2**18  # bytes of a file of forces
-DATA = ("eop", "kernel")  # keys beside the fields of Forces
+DATA = ("eop", "kernel", "asteroid_kernel", "weather")  # keys beside the fields of Forces
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,7 @@ class ForceChoice:
     """Forces with numbers of their coefficients and the data that they are computed with.
 
     `values` has every parameter of the forces, those in `assumed` because nobody gave them; `source` says what was chosen by.
+    `weather` is what `read_space_weather` gives; without it the file that is found where data are looked for.
     """
 
     forces: Forces
@@ -45,6 +48,8 @@ class ForceChoice:
     values: Mapping[str, float] = field(default_factory=dict)
     eop: Orientation | None = None
     kernel: str | Path | None = None
+    asteroid_kernel: str | Path | None = None
+    weather: SpaceWeather | None = None
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -61,9 +66,24 @@ class ForceChoice:
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "assumed", (*self.assumed, *said))
 
-    def functions(self, epoch: Epoch) -> dict[str, Any]:
-        """The data of a problem whose time zero is `epoch`."""
-        return self.forces.functions(epoch, self.eop, self.kernel)
+    def functions(self, epoch: Epoch, air: Any = None) -> dict[str, Any]:
+        """The data of a problem whose time zero is `epoch`, with the `air` of its orbit."""
+        return self.forces.functions(epoch, self.eop, self.kernel, self.asteroid_kernel, air)
+
+    def air(self, epoch: Epoch, orbit: Any, at: float = 0.0) -> Thermosphere | None:
+        """The thermosphere about an orbit, (6,) in m and m/s, `at` s after the epoch; None where no force needs it.
+
+        Raises
+        ------
+        ValueError
+            Where there is no file of space weather.
+        """
+        if self.forces.drag != "msis":
+            return None
+        weather = self.weather or next(found("weather"), None)
+        if weather is None:
+            raise ValueError("drag 'msis' needs space weather: give weather=FILE, or get it by: piazzi data get weather")
+        return Thermosphere(epoch, orbit, weather, at)
 
     def __str__(self) -> str:
         f = self.forces
@@ -203,11 +223,13 @@ def force_field(name: str, value: Any, folder: Path) -> Any:
 
 
 def read_data(name: str, value: Any, folder: Path) -> Any:
-    """The orientation of the Earth, from a file of the IERS or as a table of constants; or the path of a kernel."""
-    if name == "kernel":
+    """Orientation of the Earth, from a file of the IERS or as a table of constants; space weather; or the path of a kernel."""
+    if name.endswith("kernel"):
         path = folder / str(value)
         check_kernel(path)
         return path
+    if name == "weather":
+        return read_space_weather(folder / str(value))
     if isinstance(value, Mapping):
         known = [f.name for f in fields(EOP)]
         for key in value:
@@ -246,9 +268,8 @@ def _of_file(path: Path) -> ForceChoice:
         raise ValueError(f"{path}: there is no table [earth] in it, or [parameters] is no table")
     flat = {key: value.get("value") if isinstance(value, Mapping) else value for key, value in numbers.items()}
     try:
-        found = forces_of(earth, path.parent, path.name, numbers="[parameters]")
-        known = found.forces.parameters  # a scenario has others, of its own equations
-        values = {key: _number(key, value) for key, value in flat.items() if key in known}
-        return ForceChoice(found.forces, found.source, values, found.eop, found.kernel)
+        chosen = forces_of(earth, path.parent, path.name, numbers="[parameters]")
+        known = chosen.forces.parameters  # a scenario has others, of its own equations
+        return replace(chosen, values={key: _number(key, value) for key, value in flat.items() if key in known}, assumed=())
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None

@@ -41,8 +41,9 @@ class Thermosphere(Tabulated):
     Parameters
     ----------
     epoch : the instant of t = 0, that of the problem
-    orbit : x, y, z, vx, vy, vz (m, m/s, GCRF) at the epoch; the arc goes from there with the flattening of the Earth alone
+    orbit : x, y, z, vx, vy, vz (m, m/s, GCRF) at `orbit_time`; the arc goes from there with the flattening of the Earth alone
     weather : a file of CelesTrak with F10.7 and Ap, or what `read_space_weather` gives
+    orbit_time : s after the epoch, when the orbit is there
 
     Raises
     ------
@@ -57,6 +58,7 @@ class Thermosphere(Tabulated):
     epoch: Epoch
     orbit: Sequence[float]
     weather: SpaceWeather | str | Path
+    orbit_time: float = 0.0
 
     def __post_init__(self) -> None:
         orbit = tuple(float(value) for value in self.orbit)
@@ -70,7 +72,8 @@ class Thermosphere(Tabulated):
     def checksum(self) -> str:
         """Hash of what the table is."""
         indices = np.column_stack([self._weather.mjd, self._weather.f107, self._weather.f107_average, self._weather.ap3])
-        return checksum("thermosphere", self.epoch.whole, self.epoch.fraction, np.array(self.orbit), indices)
+        arc = np.array([*self.orbit, self.orbit_time])
+        return checksum("thermosphere", self.epoch.whole, self.epoch.fraction, arc, indices)
 
     @property
     def _weather(self) -> SpaceWeather:
@@ -118,6 +121,7 @@ class Thermosphere(Tabulated):
 
     def _arc(self, t: Array) -> Array:
         """Places of the nominal arc, (K, 3), by cubics through places and velocities a minute apart."""
+        t = t - self.orbit_time
         day = np.floor(t / DAY)
         out = np.empty((len(t), 3))
         for k in np.unique(day):

@@ -93,6 +93,13 @@ def _refusals(table: Table, key: str) -> Iterator[None]:
         table.fault(key, str(error))
 
 
+def data_of(choice: ForceChoice, epoch: Epoch) -> dict[str, Any]:
+    """The data of the forces; of air about an orbit that is not read yet, a place only, which `with_orbit` fills."""
+    from piazzi.earth.force_air import NOWHERE
+
+    return choice.functions(epoch, NOWHERE)
+
+
 def step_of(states: Sequence[str], mean: Array) -> float:
     """The longest step (s) of order 8 on the orbit of a mean state; raises ValueError for one inside the Earth."""
     from piazzi.earth.geodetic import ELLIPSOIDS

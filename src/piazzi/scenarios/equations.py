@@ -24,6 +24,7 @@ class Physics:
     """What the equations' half says: the model, None where it is faulty, and the unit of every name.
 
     `forces` are those of [earth]; `dynamics`, `definitions` and `functions` what the file has beside them.
+    `orbit` is (6,) in m and m/s of the prior, and its time in s past the epoch.
     `defaults` are numbers in SI for stations of a sensor that give none, `schedules` those of stations without their own.
     """
 
@@ -44,6 +45,7 @@ class Physics:
     defaults: dict[str, dict[str, float]] = field(default_factory=dict)
     instruments: dict[str, Any] = field(default_factory=dict)
     schedules: dict[str, Schedule | None] = field(default_factory=dict)
+    orbit: tuple[Any, float] | None = None
 
     @property
     def known(self) -> set[str]:

@@ -23,7 +23,7 @@ from piazzi.problem.gaps import is_restricted
 from piazzi.problem.truth import true_problem
 from piazzi.scenarios.earth import read_earth, step_of, with_forces
 from piazzi.scenarios.motion import read_gauss_markov, read_integrator, read_manoeuvres
-from piazzi.scenarios.physics import read_physics
+from piazzi.scenarios.physics import read_physics, with_orbit
 from piazzi.scenarios.scenario import Picture, Scenario, read_plan, read_recording, read_times
 from piazzi.scenarios.table import Fault, Faults, ScenarioError, Table, shown
 from piazzi.scenarios.truth import read_truth
@@ -204,6 +204,9 @@ def read_problem(file: Table, name: str, units: Units, start: float | None = Non
         return None
     stations = read_stations(file, physics, units, epoch)
     prior, prior_time = read_prior(file.table("prior"), physics, file.table("truth"), units, start, epoch)
+    if prior is not None:
+        with file.faults.at("earth"):
+            with_orbit(physics, epoch, prior.mean, (start or 0.0) if prior_time is None else prior_time)
     noise = read_noise(file.table("process_noise"), physics) if "process_noise" in file else None
     gauss_markov = read_gauss_markov(file.table("gauss_markov"), physics, units) if "gauss_markov" in file else None
     manoeuvres = read_manoeuvres(file, physics, units)

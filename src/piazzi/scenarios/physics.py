@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from piazzi.model import STEP, Model, Parameter, Role, Sensor
 from piazzi.model.definitions import name_of
-from piazzi.scenarios.earth import definitions_of, dynamics_of
+from piazzi.scenarios.earth import GROUPS, data_of, definitions_of, dynamics_of
 from piazzi.scenarios.equations import Physics, equation, provided_names, read_definitions, read_roots
 from piazzi.scenarios.functions import read_functions
 from piazzi.scenarios.quantities import example_of, named_units, unit_of
@@ -19,6 +19,7 @@ from piazzi.units import ONE, Units, is_quantity
 
 if TYPE_CHECKING:
     from piazzi.earth import Epoch, ForceChoice
+    from piazzi.problem.checks import Array
 
 MAX_STATES = 100
 
@@ -43,7 +44,7 @@ def read_physics(file: Table, units: Units, epoch: Epoch | None = None, forces: 
         return out
     _memory(file.table("memory"), out)
     parameters = _parameters(file.table("parameters"), units, out)
-    given = {} if forces is None or epoch is None else forces.functions(epoch)
+    given = {} if forces is None or epoch is None else data_of(forces, epoch)
     out.functions = {**given, **read_functions(file.table("functions"), epoch)}
     known, solved = {*out.known, *([STEP] if "step" in file else [])}, file.table("roots")
     out.definitions = read_definitions(file.table("definitions"), {*known, *provided_names(solved.data)}, out)
@@ -57,6 +58,16 @@ def read_physics(file: Table, units: Units, epoch: Epoch | None = None, forces: 
         with file.faults.at(""):
             out.model = shared(_model(out, parameters, [s for s in sensors if s is not None], labels, "step" in file))
     return out
+
+
+def with_orbit(physics: Physics, epoch: Epoch | None, mean: Array, time: float) -> None:
+    """Note where the prior has the satellite, and make the air about its orbit, if a force needs that."""
+    if physics.forces is None or epoch is None:
+        return
+    order = [name for group in GROUPS.values() for name in group]
+    physics.orbit = mean[[physics.states.index(name) for name in order]], time
+    air = physics.forces.air(epoch, *physics.orbit)
+    physics.functions |= {} if air is None else {"air": air}
 
 
 def _model(out: Physics, parameters: list[Parameter], sensors: list[Sensor], labels: dict[str, str], discrete: bool) -> Model:

@@ -44,7 +44,9 @@ def read_true_physics(file: Table, table: Table, physics: Physics, units: Units,
         forces = read_earth(table.table("earth"), epoch, base)
         if forces is None:
             return out
-        meant = forces.functions(epoch)  # type: ignore[arg-type]
+        if not physics.orbit:
+            return out  # the prior has faults
+        meant = forces.functions(epoch, forces.air(epoch, *physics.orbit))  # type: ignore[arg-type]
         same = {name: f.checksum for name, f in physics.functions.items()}
         out.functions = {name: f for name, f in meant.items() if same.get(name) != f.checksum}
     out.functions |= read_functions(table.table("functions"), epoch)
