@@ -1,12 +1,17 @@
 """What one sees first: help, version, and being told what was mistyped."""
 
+import os
 import re
+import subprocess
+import sys
 
 import pytest
 
 import piazzi
-from piazzi.cli.commands import COMMANDS
+from piazzi.cli.commands import COMMANDS, GROUPS
 from piazzi.estimate.registry import ESTIMATORS
+
+MAIN = "import sys; sys.argv = ['piazzi']; from piazzi.cli.main import main; main()"
 
 
 def test_version(call):
@@ -31,6 +36,30 @@ def test_every_help_fits_a_terminal_and_has_examples(call, command):
     assert max(map(len, result.out.splitlines())) <= 80
 
 
+def test_commands_stand_by_what_people_want(call):
+    text = call("--help").out
+    headings = [text.index(f"\n{heading}:\n") for heading in GROUPS]
+    assert headings == sorted(headings)
+    assert [name for names in GROUPS.values() for name in names] == re.findall(r"^  (\w+) +\S", text[headings[0] :], re.M)
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("piazzi det", ["plain,determine"]),
+        ("piazzi compare b612", ["plain,b612-range", "plain,b612-range-q0", "file,b612"]),
+        ("piazzi compare x --with sm", ["plain,smoother"]),
+        ("piazzi determine x --agai", ["plain,--against"]),
+    ],
+)
+def test_shells_complete_what_is_typed(typed, offered):
+    """As the scripts that click makes for bash ask for it."""
+    words = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1), "_PIAZZI_COMPLETE": "bash_complete"}
+    program = [sys.executable, "-P", "-c", MAIN]
+    done = subprocess.run(program, env=os.environ | words, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == offered
+
+
 def test_help_names_the_estimators_that_there_are(call):
     text = call("compare", "-h").out
     for entry in ESTIMATORS.values():
@@ -48,7 +77,7 @@ def test_no_command_shows_the_help(call):
     ("arguments", "message"),
     [
         (["estmate"], "unknown command 'estmate'; did you mean 'estimate'?"),
-        (["xyz"], "unknown command 'xyz'; known: demo, scenarios, simulate, estimate, compare"),
+        (["xyz"], "unknown command 'xyz'; known: determine, tracking, propagate"),
         (["estimate"], "estimate: missing argument 'SOURCE'"),
         (["estimate", "a", "b"], "estimate: got unexpected extra argument (b)"),
         (["estimate", "a", "--wth", "ekf"], "did you mean '--with'?"),

@@ -30,6 +30,14 @@ process_noise = { variance = [1e-6, 1e-6, 1e-6, 1e-6] }
 times = { step = 0.1, count = 30 }
 truth = { state = "drawn" }
 """
+ORBIT = """
+epoch = "2016-02-13T16:00:00 UTC"
+earth = { degree = 0, bodies = [], tides = [], relativity = false }
+sensors.fix.components = { x = "bx", y = "by", z = "bz" }
+stations = [{ name = "receiver", sensor = "fix", noise = { sigma = [1.0, 1.0, 1.0] } }]
+prior = { mean = [7e6, 0, 0, 0, 5e3, 5.5e3], sigma = [10, 10, 10, 0.01, 0.01, 0.01] }
+times = { step = 60.0, count = 100 }
+"""
 COMMANDS = """
 --version
 --help
@@ -51,6 +59,12 @@ observability own.nc --no-twins -o seen.json
 report own.nc --with ekf --with graph --windows 5 -o report.html
 study own.toml --runs 6 --with ekf --workers 2 -o study.nc --report study.html --figures figures
 study own.toml --runs 6 --with ekf -o study.nc --resume --json
+data --json
+propagate orbit.toml -o orbit.oem
+propagate orbit.oem --forces none --step 10min --to 2h -o later.csv
+tracking orbit.oem
+determine orbit.oem --sigma 10m --forces none --json
+difference orbit.oem orbit.oem
 """.strip().splitlines()
 CLUSTER = "study own.toml --runs 6 --with ekf --scheduler local --workers 1 -o cluster.nc"
 USAGE = ("", "estimate", "estimate nowhere.nc", "estimate own.nc --seed x", "simulate own.toml --tolerance x")
@@ -132,6 +146,8 @@ def readable(path: Path) -> None:
             from piazzi.study.store import read_store
 
             assert read_store(path).summary.success
+        case ".oem":
+            assert len(pz.read_ephemeris(path).arcs[0].t) == 100
         case ".html":
             assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
         case ".png":
@@ -142,6 +158,7 @@ def smoke(folder: Path) -> int:
     """Number of failures."""
     failures = imports()
     (folder / "own.toml").write_text(SCENARIO)
+    (folder / "orbit.toml").write_text(ORBIT)
     for words in [*COMMANDS, *([CLUSTER] if importlib.util.find_spec("distributed") else [])]:
         started = time.monotonic()
         status, out, said = run(words, folder)

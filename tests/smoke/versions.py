@@ -1,8 +1,8 @@
 """Installs Piazzi with the lowest or the newest versions that it allows, and runs every command with them.
 
-`python tests/smoke/versions.py lowest|newest`: pip knows no lowest versions, so each ``name>=1.2,<2`` of pyproject.toml becomes
-the constraint ``name==1.2``; newest are those that pip finds, upper bounds or not, so that what comes next is known before it
-is allowed.  Everything is made anew in .cache.
+`python tests/smoke/versions.py lowest|newest`: the wheel is built, looked into and installed.  pip knows no lowest versions, so
+each ``name>=1.2,<2`` of pyproject.toml becomes the constraint ``name==1.2``; newest are those that pip finds, upper bounds or
+not, so that what comes next is known before it is allowed.  Everything is made anew in .cache.
 """
 
 import os
@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tomllib
 import venv
+import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -50,6 +51,14 @@ def requirements() -> list[str]:
     return [*project["dependencies"], *(r for extra in EXTRAS for r in project["optional-dependencies"][extra])]
 
 
+def left_out(wheel: Path) -> list[str]:
+    """Files of the package that a wheel does not have."""
+    with zipfile.ZipFile(wheel) as archive:
+        inside = set(archive.namelist())
+    files = (path.relative_to(ROOT / "src").as_posix() for path in (ROOT / "src" / "piazzi").rglob("*") if path.is_file())
+    return sorted(name for name in files if name not in inside and "__pycache__" not in name)
+
+
 def main(which: str) -> int:
     place = ROOT / ".cache" / f"smoke-{which}"
     shutil.rmtree(place, ignore_errors=True)
@@ -57,13 +66,19 @@ def main(which: str) -> int:
     venv.create(place / "venv", with_pip=True)
     python = place / "venv" / ("Scripts" if os.name == "nt" else "bin") / "python"
     pip = [python, "-m", "pip", "-q", "-q", "--no-input", "--disable-pip-version-check", "install", "--no-compile"]
-    if which == "lowest":
-        (place / "constraints.txt").write_text("\n".join(map(lowest, requirements())))
-        steps = [[*pip, "-c", place / "constraints.txt", f"{ROOT}[{','.join(EXTRAS)}]"]]
-    else:
-        steps = [[*pip, *map(newest, requirements())], [*pip, "--no-deps", ROOT]]
     environment = {**os.environ, "PIAZZI_CACHE": str(place / "kernels")}
     try:
+        subprocess.run([*pip[:-2], "wheel", "--no-deps", "--wheel-dir", place, ROOT], check=True)
+        (wheel,) = place.glob("*.whl")
+        if missing := left_out(wheel):
+            print(f"FAILED  {wheel.name} lacks {', '.join(missing)}")
+            return 1
+        print(f"{wheel.name}: {wheel.stat().st_size / 1e6:.1f} MB, every file of src/piazzi is in it")
+        if which == "lowest":
+            (place / "constraints.txt").write_text("\n".join(map(lowest, requirements())))
+            steps = [[*pip, "-c", place / "constraints.txt", f"{wheel}[{','.join(EXTRAS)}]"]]
+        else:
+            steps = [[*pip, *map(newest, requirements())], [*pip, "--no-deps", wheel]]
         for step in [*steps, [python, "-P", COMMANDS]]:
             subprocess.run(step, env=environment, check=True)
     except subprocess.CalledProcessError as error:

@@ -10,22 +10,12 @@ from piazzi import __version__
 from piazzi.cli.options import Group
 from piazzi.text import nearest
 
-COMMANDS = (
-    "demo",
-    "scenarios",
-    "simulate",
-    "estimate",
-    "compare",
-    "study",
-    "windows",
-    "observability",
-    "report",
-    "tracking",
-    "determine",
-    "propagate",
-    "difference",
-    "data",
-)
+GROUPS = {
+    "Orbits from tracking": ("determine", "tracking", "propagate", "difference"),
+    "Estimators side by side": ("compare", "estimate", "study", "windows", "observability", "report"),
+    "Scenarios and data": ("demo", "scenarios", "simulate", "data"),
+}
+COMMANDS = tuple(name for group in GROUPS.values() for name in group)
 
 
 class Commands(Group):
@@ -39,6 +29,14 @@ class Commands(Group):
             return None
         command: click.Command = import_module(f"piazzi.cli.{cmd_name}").command
         return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """What there is, by what people want."""
+        width = formatter.width - 4 - max(map(len, COMMANDS))
+        for heading, names in GROUPS.items():
+            commands = [(name, self.get_command(ctx, name)) for name in names]
+            with formatter.section(heading):
+                formatter.write_dl([(name, command.get_short_help_str(width)) for name, command in commands if command])
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         if args and not args[0].startswith("-") and args[0] not in COMMANDS:

@@ -13,11 +13,33 @@ from itertools import combinations
 from typing import Any, TypeVar, cast
 
 import click
+from click.shell_completion import CompletionItem
 
 F = TypeVar("F", bound=Callable[..., Any])
-source = click.argument("source", metavar="SOURCE")
+
+
+def _scenarios(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """For shells: scenarios that begin so, and files."""
+    from piazzi.scenarios import names
+
+    return [*(CompletionItem(name) for name in names() if name.startswith(incomplete)), CompletionItem(incomplete, type="file")]
+
+
+def _estimators(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """For shells: estimators that begin so."""
+    from piazzi.estimate.registry import ESTIMATORS
+
+    return [CompletionItem(name) for name in ESTIMATORS if name.startswith(incomplete)]
+
+
+source = click.argument("source", metavar="SOURCE", shell_complete=_scenarios)
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, and nothing else there.")
-scenario = click.option("--scenario", metavar="NAME", help="Scenario that defines the problem, for CSV and tracking files.")
+scenario = click.option(
+    "--scenario",
+    metavar="NAME",
+    shell_complete=_scenarios,
+    help="Scenario that defines the problem, for CSV and tracking files.",
+)
 SCALES = ("UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1")
 STREAM = "-"
 STATIONS = "Stations of tracking: SINEX, TOML, ilrs or mpc; may be repeated."
@@ -70,6 +92,7 @@ def estimators(default: str) -> Callable[[F], F]:
         "names",
         metavar="ESTIMATOR",
         multiple=True,
+        shell_complete=_estimators,
         help=f"Estimator, may be repeated; see below.  [default: {default}]",
     )
 
