@@ -24,6 +24,7 @@ model
 kernels
 outside
 earth
+tables
 formats
 problem tracking orbit
 scenarios

@@ -75,7 +75,7 @@ def _with_prior_before(text: str, problem: Problem, tracking: Tracking) -> tuple
 def _mapping(columns: Mapping[str, str] | str | None) -> Mapping[str, str]:
     if not isinstance(columns, str):
         return columns or {}
-    from piazzi.io.naming import parse_columns
+    from piazzi.tables.names import parse_columns
 
     return parse_columns(columns)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from typing import Any
 
 LONGEST = 500
 _FORMULA = re.compile(r"'*[=+\-@\t\r]")
@@ -28,6 +29,17 @@ def unescape_formula(cell: str) -> str:
 def one_line(text: str, longest: int = LONGEST) -> str:
     """The text on one line of sane length, with control characters written out."""
     return printable(text if len(text) <= longest else text[:longest] + " ...")
+
+
+def shown(value: Any) -> str:
+    """A value as a message shows it: short, and on one line."""
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list):
+        short = len(value) <= 4 and not any(isinstance(v, dict | list) for v in value)
+        return one_line(repr(value)) if short else f"a list of {len(value)}"
+    text = repr(value) if not isinstance(value, int) or abs(value) < 10**20 else "a number of more than 20 digits"
+    return one_line(text if len(text) <= 60 else text[:57] + "...")
 
 
 def suggestion(name: str, valid: Iterable[object]) -> str:

@@ -195,7 +195,7 @@ class Csv(Format):
         arguments = [*words, "--scenario", "a.toml"]
 
         def run() -> int:
-            from piazzi.io import cells
+            from piazzi.tables import cells
 
             cells.SMALL = small
             return command(arguments)()

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
-from piazzi.io import cells, save
+from piazzi.io import save
 from piazzi.io.csv import read_csv, write_csv
+from piazzi.tables import cells
 from piazzi.text import escape_formula, unescape_formula
 from tests.references.drawn import FLOATS, TEXT, problems, same_bits, same_tracking, trackings
 

@@ -15,13 +15,14 @@ import piazzi as pz
 from piazzi.cli import options
 from piazzi.earth.columns import read_dates
 from piazzi.earth.scales import SCALES
-from piazzi.io import cells, load_estimate, save, save_estimate
+from piazzi.io import load_estimate, save, save_estimate
 from piazzi.io.checkpoint import fingerprint
 from piazzi.io.csv import read_csv
 from piazzi.io.lines import RowReader
 from piazzi.io.npz import read_npz, write_npz
 from piazzi.scenarios import ScenarioError, load_scenario
 from piazzi.scenarios.write import problem_from_tables, problem_to_tables
+from piazzi.tables import cells
 from tests.references.drawn import same_problem, same_tracking
 
 EPOCH = pz.Epoch("2016-12-31T23:00:00 UTC")  # an hour and a second before a day that followed a leap second

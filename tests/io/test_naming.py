@@ -5,10 +5,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
-from piazzi.io import cells
 from piazzi.io.csv import read_csv
-from piazzi.io.naming import named, parse_columns
+from piazzi.io.naming import named
 from piazzi.opening import RecordingWarning
+from piazzi.tables import cells
+from piazzi.tables.names import parse_columns
 from tests.io.test_csv import ALONE, GOOD, PROBLEM
 from tests.references.drawn import same_tracking
 

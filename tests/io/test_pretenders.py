@@ -11,12 +11,12 @@ from piazzi.earth.eop import read_eop
 from piazzi.earth.fields import read_gravity
 from piazzi.io.archive import read_arrays
 from piazzi.io.atomic import atomic_path
-from piazzi.io.cells import read_cells
 from piazzi.io.files import load_estimate
 from piazzi.scenarios import check, load_scenario, show
 from piazzi.study import read_store
 from piazzi.study.execute import kept_runs
 from piazzi.study.log import ENDING, Log
+from piazzi.tables.cells import read_cells
 from tests.waiting import HANGS
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")

@@ -18,7 +18,9 @@ _OPTIONS: tuple[tuple[str, str, str, bool], ...] = (
     ("interval", "SECONDS", "Over which range rates are averaged.", False),
     ("interval-reference", "PART", "Of that interval, what times are of: start, middle or end.", False),
     ("repair", "WHAT", "Mend what contradicts its neighbours: exponent, of ranges of space surveillance.", False),
-    ("time", "SCALE", "Time scale of dates, as GPS or BER=GPS; may be repeated.", True),
+    ("columns", "NAMES", "What columns of tables are: 'week=gps_week sow=gps_tow x=X[km] ignore=Q'.", False),
+    ("scale", "SCALE", "Time scale of dates that name none: UTC, GPS, ...", False),
+    ("time", "SCALE", "Time scale of a station's dates, as BER=GPS; may be repeated.", True),
     ("sigma", "SIGMA", "Standard deviations, as 10m, range=10m or range.BER=10m; may be repeated.", True),
 )
 

@@ -50,8 +50,8 @@ def recording(function: F) -> F:
 
     @wraps(function)
     def command(*args: Any, scale: str | None, columns: str | None, **rest: Any) -> Any:
-        from piazzi.io.naming import parse_columns
         from piazzi.scenarios import Recording
+        from piazzi.tables.names import parse_columns
 
         tracked = [rest.pop(name) for name in ("chosen", "sigma", "stations")]
         return function(*args, recording=Recording(parse_columns(columns or ""), scale, *tracked), **rest)

@@ -9,7 +9,7 @@ import numpy as np
 
 from piazzi.earth import scales
 from piazzi.earth.dates import Reading, read_date
-from piazzi.earth.epoch import orientation
+from piazzi.earth.epoch import Epoch, orientation
 
 Array = np.ndarray[Any, Any]
 
@@ -18,6 +18,8 @@ _MARKS = ((4, b"-"), (7, b"-"), (13, b":"), (16, b":"))
 _START = 19  # where decimals and the scale begin
 _MOST_DECIMALS = 15  # which a double holds exactly as a whole number
 _TAIL = 8  # bytes that a scale takes with what is around it
+_MOST_WEEKS = 10_000
+_WEEK = 604800.0  # s
 _ZERO_UNIX = 40587.0  # MJD of 1970-01-01
 
 
@@ -66,6 +68,20 @@ def read_dates(texts: Array, scale: str | None = None, place: Callable[[int], st
         raise ValueError(f"{place(i)}date {_text(texts[i])!r} is in {here}, those before in {before}; one file has one scale")
     kind = known[int(kinds[0])]
     return Instants(kind, *scales.to_tt(kind, day, seconds, fraction, orientation(kind)))
+
+
+def read_weeks(week: Array, second: Array, place: Callable[[int], str] = "row {}: ".format) -> Instants:
+    """Instants of weeks of GPS since 1980 and seconds of them; raises ValueError, with the place, for what is neither."""
+    bad = ~((week >= 0) & (week < _MOST_WEEKS) & (week == np.floor(week)))
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise ValueError(f"{place(i)}the week is {week[i]:g}; it must be a whole number below {_MOST_WEEKS:,}")
+    bad = ~((second >= 0) & (second < _WEEK))
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise ValueError(f"{place(i)}the second of the week is {second[i]:g}; it must be from 0 to 604800")
+    first, whole = Epoch("1980-01-06T00:00:00 GPS"), np.floor(second)
+    return Instants("GPS", first.whole + week * _WEEK + whole, first.fraction + (second - whole))
 
 
 def _one(text: str, scale: str | None, place: str) -> Reading:

@@ -13,6 +13,7 @@ from piazzi.earth.scales import SCALES
 from piazzi.formats.frames import KNOWN, frame_named, settled
 from piazzi.formats.kinds import ANGLES, KINDS, TAGS
 from piazzi.formats.observations import Array, Observations, Segment
+from piazzi.tables.names import parse_columns
 from piazzi.text import nearest, suggest
 from piazzi.units import Units
 
@@ -48,6 +49,7 @@ class Conventions:
     interval, interval_reference : s over which rates are averaged, and the part of it that times are of
     scales : time scale by station, that of all others under ""
     sigmas : standard deviations
+    columns : of tables, our names and those of the file
     options : whatever else one format asks for, by name
     """
 
@@ -60,11 +62,14 @@ class Conventions:
     interval_reference: str | None = None
     scales: tuple[tuple[str, str], ...] = ()
     sigmas: tuple[Sigma, ...] = ()
+    columns: tuple[tuple[str, str], ...] = ()
     options: tuple[tuple[str, Any], ...] = ()
 
     @classmethod
-    def of(cls, *, time: Any = None, sigma: Any = None, interval: Any = None, **words: Any) -> Conventions:
-        """Conventions from words, as the command line and `read_tracking` take them.
+    def of(
+        cls, *, time: Any = None, scale: Any = None, sigma: Any = None, interval: Any = None, columns: Any = None, **words: Any
+    ) -> Conventions:
+        """Conventions from words, as the command line and `read_tracking` take them; `scale` is `time` of all stations.
 
         Raises
         ------
@@ -75,12 +80,22 @@ class Conventions:
         frame = words.pop("frame", None)
         if frame is not None and (frame := frame_named(str(frame))) not in KNOWN:
             raise ValueError(f"axes {frame!r} are none of {', '.join(KNOWN)}{suggest(frame, KNOWN)}")
-        scales = tuple(_scale(text) for text in _texts(time))
+        scales = tuple(_scale(text) for text in (*_texts(time), *_texts(scale)))
+        names = parse_columns(columns) if isinstance(columns, str) else columns or {}
+        named = {ours: theirs if isinstance(theirs, str) else ",".join(map(str, theirs)) for ours, theirs in names.items()}
         sigmas = tuple(_sigma(text) for text in _texts(sigma))
         seconds = None if interval is None else float(interval)
         if seconds is not None and not 0 < seconds < np.inf:
             raise ValueError(f"an interval is a positive number of seconds, not {interval!r}")
-        return cls(**chosen, frame=frame, interval=seconds, scales=scales, sigmas=sigmas, options=tuple(words.items()))
+        return cls(
+            **chosen,
+            frame=frame,
+            interval=seconds,
+            scales=scales,
+            sigmas=sigmas,
+            columns=tuple(named.items()),
+            options=tuple(words.items()),
+        )
 
     def scale_of(self, station: str) -> str | None:
         """The time scale that the user says a station's dates are in."""

@@ -9,6 +9,7 @@ from dataclasses import replace
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from piazzi.formats import table_header
 from piazzi.formats.conventions import Conventions, with_conventions
 from piazzi.formats.ephemeris import Ephemeris
 from piazzi.formats.frames import settled
@@ -52,6 +53,7 @@ def _in_columns(pattern: bytes) -> Callable[[bytes], bool]:
 
 _PLAIN = _begins(rb"(?:#[^\n]*\n\s*)*[0-3]\s+\S+\s+\S+\s+[12]\d{3}\s+\d+\s+\d+\s+\d+\s+\d+\s+\d+\.\d*\s")
 
+TABLE = "CSV"
 FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "SP3": Format(_begins(rb"#[a-d][PV ]"), ephemeris="sp3:read"),
     "CPF": Format(_begins(_REMARKS + rb"[Hh]1\s+[Cc][Pp][Ff]\s"), ephemeris="cpf:read"),
@@ -71,6 +73,7 @@ FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "OMM": Format(_begins(rb"CCSDS_OMM_VERS\s*="), ephemeris="opm:read_omm"),
     "TLE": Format(_begins(rb"(?:[^\n]*\n)?1 [ 0-9A-Z]{5}[ A-Z] .{8} \d\d[ \d]{3}\."), ephemeris="tle:read"),
     "OEM XML": Format(_root(rb"(?:oem|opm|omm|ndm)"), ephemeris="odm_xml:read"),
+    TABLE: Format(table_header.looks, tracking="table:read"),
 }
 
 
@@ -89,7 +92,7 @@ def read_tracking(*paths: str | os.PathLike[str], **conventions: Any) -> Observa
     ----------
     paths : files, put together in this order
     conventions : what the files do not say, see `formats.conventions.Conventions`: ``range="two-way"``, ``time="GPS"``,
-        ``angles="geocentric"``, ``sigma="range.BER=10m"``
+        ``angles="geocentric"``, ``sigma="range.BER=10m"``, ``columns="week=gps_week sow=gps_tow x=X[km]"``
 
     Raises
     ------
@@ -105,7 +108,7 @@ def read_tracking(*paths: str | os.PathLike[str], **conventions: Any) -> Observa
 
 
 def _tracking(path: str | os.PathLike[str], told: Conventions) -> Observations:
-    data, form, name = _opened(path)
+    data, form, name = _opened(path, bool(told.columns))
     if form.tracking is None:
         from piazzi.formats.fixes import fixes_of
 
@@ -138,7 +141,8 @@ def read_ephemeris(path: str | os.PathLike[str], **conventions: Any) -> Ephemeri
     return replace(found, arcs=tuple(arcs), open=tuple(text for text in found.open if "--frame" not in text))
 
 
-def _opened(path: str | os.PathLike[str]) -> tuple[bytes, Format, str]:
+def _opened(path: str | os.PathLike[str], named: bool = False) -> tuple[bytes, Format, str]:
+    """Contents, format and name of a file; where columns are `named`, whatever is of no other format is a table."""
     name, data = os.fspath(path), read_bytes(path)
     if not data or data.isspace():
         raise ValueError(f"{name}: the file is empty")
@@ -146,8 +150,11 @@ def _opened(path: str | os.PathLike[str]) -> tuple[bytes, Format, str]:
     if found is None and (doctype := data[:HEAD].find(b"<!DOCTYPE")) >= 0:
         line = data.count(b"\n", 0, doctype) + 1
         raise ValueError(f"{name}: line {line}: the file has a DOCTYPE, which may name other files; it is not read")
+    if found is None and named:
+        found = TABLE
     if found is None:
-        raise ValueError(f"{name}: line 1: the file is of no format that is known: {', '.join(_names())}")
+        hint = '; of a table say the columns, as --columns "time=T range=RNG[km]"' if b"," in data[:HEAD] else ""
+        raise ValueError(f"{name}: line 1: the file is of no format that is known: {', '.join(_names())}{hint}")
     return data, FORMATS[found], name
 
 

@@ -8,7 +8,8 @@ from math import isnan
 
 import numpy as np
 
-from piazzi.formats.kinds import KINDS
+from piazzi.formats.conventions import RANGES
+from piazzi.formats.kinds import KINDS, TAGS
 from piazzi.formats.observations import Observations
 from piazzi.formats.writing import dates
 from piazzi.text import escape_formula
@@ -17,8 +18,13 @@ from piazzi.text import escape_formula
 def csv_text(observations: Observations) -> str:
     """A CSV with dates in the scale of the files; rows of one time, station and object that stand together share a line.
 
-    Columns are ``time[SCALE]``, ``station`` and ``object`` where there are any, each kind with its SI unit, and ``sigma KIND``
-    where there are sigmas.  Raises ValueError for no rows, or rows in more than one time scale.
+    Conventions that hold for all rows stand above it, as ``# frame = ITRF``.  Columns are ``time[SCALE]``, ``station`` and
+    ``object`` where there are any, each kind with its SI unit, and ``sigma KIND [UNIT]`` where there are sigmas.
+
+    Raises
+    ------
+    ValueError
+        For no rows, or rows in more than one time scale.
     """
     rows = observations
     if not len(rows):
@@ -31,8 +37,16 @@ def csv_text(observations: Observations) -> str:
     people = {name: getattr(rows, name) for name in ("station", "object") if (getattr(rows, name) >= 0).any()}
     heads = [f"{kind} [{KINDS[kind].unit}]" if KINDS[kind].unit else kind for kind in kinds]
     out = io.StringIO()
+    out.writelines(f"# {name} = {word}\n" for name, word in _said(rows))
     table = csv.writer(out, lineterminator="\n")
-    table.writerow([f"time[{scales[0]}]", *people, *heads, *(f"sigma {kind}" for kind in sigmas)])
+    table.writerow(
+        [
+            f"time[{scales[0]}]",
+            *people,
+            *heads,
+            *(f"sigma {head}" for head, kind in zip(heads, kinds, strict=True) if kind in sigmas),
+        ]
+    )
     place = {kind: i for i, kind in enumerate(kinds)}
     columns = [place.get(kind, -1) for kind in rows.kinds]
     beside = {columns[rows.kinds.index(kind)]: len(kinds) + i for i, kind in enumerate(sigmas)}
@@ -54,3 +68,15 @@ def csv_text(observations: Observations) -> str:
             cells[beside[column]] = repr(sigma)
     table.writerow([*opening, *cells])
     return out.getvalue()
+
+
+def _said(rows: Observations) -> list[tuple[str, str]]:
+    """Conventions that are the same for all rows, by the names of `Conventions`."""
+    used = [rows.segments[i] for i in np.unique(rows.segment)]
+    out = [
+        (name, {getattr(segment, name) for segment in used}) for name in ("frame", "angles", "interval", "interval_reference")
+    ]
+    ways = {ends: word for word, ends in RANGES.items()}
+    out.append(("range", {ways.get((segment.way, segment.range_is)) for segment in used}))
+    out.append(("tag", {TAGS[i] or None for i in np.unique(rows.tag)}))
+    return [(name, str(words.pop())) for name, words in out if len(words) == 1 and None not in words]

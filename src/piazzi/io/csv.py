@@ -15,14 +15,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.io.atomic import atomic_path
-from piazzi.io.cells import STATION, TIME, Cells, read_cells
 from piazzi.io.dates import EPOCH, has_weeks, times_of
-from piazzi.io.naming import SECONDS, TRUTH, WEEK, fitting, named, own_names
+from piazzi.io.naming import TRUTH, fitting, named, own_names
 from piazzi.opening import RecordingWarning
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.epochs import epoch_of
 from piazzi.scenarios import Recording
+from piazzi.tables.cells import STATION, TIME, Cells, read_cells
+from piazzi.tables.names import SECONDS, WEEK
 from piazzi.text import escape_formula, nearest, unescape_formula
 from piazzi.units import Unit, Units
 
@@ -166,7 +167,7 @@ def _in_own_units(cells: Cells, problem: Problem) -> Cells:
             raise ValueError(f"two columns are called {label!r}")
         with np.errstate(over="ignore"):
             numbers[label] = column if factor == 1.0 else column * factor
-    return replace(cells, numbers=numbers, station_names=tuple(map(unescape_formula, cells.station_names)))
+    return replace(cells.renamed(unescape_formula), numbers=numbers)
 
 
 def _factor(column: str, label: str, text: str, problem: Problem) -> float:

@@ -7,18 +7,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from piazzi.io.cells import TIME, Cells
-from piazzi.io.naming import SECONDS, WEEK
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, check_span
 from piazzi.problem.epochs import FARTHEST, check_near, epoch_given
+from piazzi.tables.cells import TIME, Cells
+from piazzi.tables.names import SECONDS, WEEK
 
 if TYPE_CHECKING:
     from piazzi.earth import Epoch
 
 EPOCH = "epoch = "
-MOST_WEEKS = 10_000
-SECONDS_OF_WEEK = 604800.0
 
 
 class Times(NamedTuple):
@@ -87,21 +85,11 @@ def _instants(cells: Cells, dates: Array, scale: str | None) -> tuple[Array, Arr
 
 def _weeks(cells: Cells, scale: str | None) -> tuple[Array, Array]:
     """Instants of weeks of GPS and seconds of them."""
-    from piazzi.earth import Epoch
+    from piazzi.earth.columns import read_weeks
 
     if scale not in (None, "GPS"):
         raise ValueError(f"--scale {scale} was said, but weeks and seconds of them are in GPS")
-    week, second = cells.numbers[WEEK], cells.numbers[SECONDS]
-    bad = ~((week >= 0) & (week < MOST_WEEKS) & (week == np.floor(week)))
-    if bad.any():
-        i = int(np.argmax(bad))
-        raise ValueError(f"line {cells.lines[i]}: the week is {week[i]:g}; it must be a whole number below {MOST_WEEKS:,}")
-    bad = ~((second >= 0) & (second < SECONDS_OF_WEEK))
-    if bad.any():
-        i = int(np.argmax(bad))
-        raise ValueError(f"line {cells.lines[i]}: the second of the week is {second[i]:g}; it must be from 0 to 604800")
-    first, whole = Epoch("1980-01-06T00:00:00 GPS"), np.floor(second)
-    return first.whole + week * SECONDS_OF_WEEK + whole, first.fraction + (second - whole)
+    return read_weeks(cells.numbers[WEEK], cells.numbers[SECONDS], lambda i: f"line {cells.lines[i]}: ")[1:]
 
 
 def _past(

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from piazzi.io.cells import STATION, TIME, dated, parse_header, parse_rows
 from piazzi.io.csv import cells_to_tracking
 from piazzi.io.dates import epoch_in
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.tables.cells import STATION, TIME, dated, parse_header, parse_rows
 
 if TYPE_CHECKING:
     from piazzi.earth import Epoch

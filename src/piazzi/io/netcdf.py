@@ -20,8 +20,9 @@ from piazzi.io import hdf5
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.epochs import epoch_given
-from piazzi.scenarios.table import Faults, Table, shown
+from piazzi.scenarios.table import Faults, Table
 from piazzi.scenarios.write import problem_from_tables, problem_to_tables
+from piazzi.text import shown
 
 if TYPE_CHECKING:
     import xarray

@@ -11,8 +11,8 @@ from piazzi.model import Sensor
 from piazzi.model.definitions import Definition
 from piazzi.model.functions import ROOT
 from piazzi.scenarios.quantities import quantity
-from piazzi.scenarios.table import Faults, Table, shown
-from piazzi.text import nearest
+from piazzi.scenarios.table import Faults, Table
+from piazzi.text import nearest, shown
 from piazzi.units import ONE, Unit, Units
 
 if TYPE_CHECKING:

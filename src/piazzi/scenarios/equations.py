@@ -10,7 +10,8 @@ from piazzi.expressions.outside import check_calls
 from piazzi.model import TIME, Model
 from piazzi.problem.parts import Schedule
 from piazzi.scenarios.earth import names_of
-from piazzi.scenarios.table import Table, shown
+from piazzi.scenarios.table import Table
+from piazzi.text import shown
 from piazzi.units import ONE, Unit
 
 if TYPE_CHECKING:

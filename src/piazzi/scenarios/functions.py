@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from piazzi.model.definitions import name_of
-from piazzi.scenarios.table import Table, shown
-from piazzi.text import nearest
+from piazzi.scenarios.table import Table
+from piazzi.text import nearest, shown
 
 if TYPE_CHECKING:
     from piazzi.earth import Epoch

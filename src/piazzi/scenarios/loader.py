@@ -25,10 +25,10 @@ from piazzi.scenarios.earth import read_earth, step_of, with_forces
 from piazzi.scenarios.motion import read_gauss_markov, read_integrator, read_manoeuvres
 from piazzi.scenarios.physics import read_physics, with_orbit
 from piazzi.scenarios.scenario import Picture, Scenario, read_plan, read_recording, read_times
-from piazzi.scenarios.table import Fault, Faults, ScenarioError, Table, shown
+from piazzi.scenarios.table import Fault, Faults, ScenarioError, Table
 from piazzi.scenarios.truth import read_truth
 from piazzi.scenarios.values import read_noise, read_parameters, read_prior, read_stations
-from piazzi.text import nearest
+from piazzi.text import nearest, shown
 from piazzi.units import Units
 
 if TYPE_CHECKING:

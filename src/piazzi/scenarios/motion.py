@@ -12,9 +12,9 @@ from piazzi import kernels
 from piazzi.kernels import Integrator
 from piazzi.problem import Manoeuvre
 from piazzi.scenarios.equations import Physics
-from piazzi.scenarios.table import Table, shown
+from piazzi.scenarios.table import Table
 from piazzi.scenarios.values import SPREADS, read_spread
-from piazzi.text import nearest
+from piazzi.text import nearest, shown
 from piazzi.units import Units
 
 INTEGRATORS: Mapping[str, type[Integrator]] = {

@@ -13,8 +13,8 @@ from piazzi.scenarios.equations import Physics, equation, provided_names, read_d
 from piazzi.scenarios.functions import read_functions
 from piazzi.scenarios.quantities import example_of, named_units, unit_of
 from piazzi.scenarios.sensors import read_sensor
-from piazzi.scenarios.table import Table, shown
-from piazzi.text import nearest
+from piazzi.scenarios.table import Table
+from piazzi.text import nearest, shown
 from piazzi.units import ONE, Units, is_quantity
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from piazzi.model.definitions import name_of
 from piazzi.problem.epochs import epoch_given
 from piazzi.problem.parts import Schedule
-from piazzi.scenarios.table import Table, shown
+from piazzi.scenarios.table import Table
+from piazzi.text import shown
 from piazzi.units import ONE, Unit, Units, is_quantity
 
 if TYPE_CHECKING:

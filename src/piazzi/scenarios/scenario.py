@@ -10,7 +10,8 @@ import numpy as np
 
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, check_span
-from piazzi.scenarios.table import Table, number, shown
+from piazzi.scenarios.table import Table, number
+from piazzi.text import shown
 from piazzi.units import Units
 
 MAX_EPOCHS = 10**7

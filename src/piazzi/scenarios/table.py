@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piazzi.problem.checks import Array
-from piazzi.text import nearest, one_line
+from piazzi.text import nearest, one_line, shown
 
 _BARE = re.compile(r"[A-Za-z0-9_-]{1,60}")
 MAX_TABLES = 1000
@@ -54,17 +54,6 @@ class Faults(list[Fault]):
             yield
         except ValueError as error:
             self.add(path, str(error))
-
-
-def shown(value: Any) -> str:
-    """A value as a message shows it: short, and on one line."""
-    if isinstance(value, dict):
-        return "a table"
-    if isinstance(value, list):
-        short = len(value) <= 4 and not any(isinstance(v, dict | list) for v in value)
-        return one_line(repr(value)) if short else f"a list of {len(value)}"
-    text = repr(value) if not isinstance(value, int) or abs(value) < 10**20 else "a number of more than 20 digits"
-    return one_line(text if len(text) <= 60 else text[:57] + "...")
 
 
 def joined(path: str, key: str | int) -> str:

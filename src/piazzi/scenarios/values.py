@@ -16,7 +16,8 @@ from piazzi.scenarios.equations import Physics
 from piazzi.scenarios.orbit_prior import AXES, names_orbit, read_orbit, to_states
 from piazzi.scenarios.orbit_prior import STATES as ORBIT
 from piazzi.scenarios.quantities import read_schedule
-from piazzi.scenarios.table import Table, shown
+from piazzi.scenarios.table import Table
+from piazzi.text import shown
 from piazzi.units import ONE, Units, is_quantity, size_of
 
 if TYPE_CHECKING:

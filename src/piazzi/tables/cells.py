@@ -6,16 +6,17 @@ import csv
 import io
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from piazzi.opening import opened
-from piazzi.problem.checks import Array
-from piazzi.scenarios.table import shown
+from piazzi.text import shown
+
+Array = np.ndarray[Any, Any]
 
 STATION = "station"
 TIME = "time"
@@ -29,6 +30,13 @@ _DATE = re.compile(r"\s*(\d{4}-\d|M?JD\s*\d)")
 SMALL = 2**19  # bytes for which the careful way takes less time than importing pandas
 
 
+class Names(NamedTuple):
+    """A column of names: (J,) indices into the different ones, in the order in which they come; -1 for an empty cell."""
+
+    code: Array
+    names: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Cells:
     """A table by columns.
@@ -37,7 +45,7 @@ class Cells:
     ----------
     comments : lines that began with # above the header
     numbers : column name -> (J,) values, NaN where empty
-    station : (J,) indices into `station_names`, None without such a column
+    texts : column name -> its names, of the columns that have them
     lines : line of the file that each row is in
     dates : (J,) texts of the column of time, as bytes, where it has dates; it is not among the numbers then
     scale : what the name of that column says of the time scale, None where it says nothing
@@ -46,20 +54,34 @@ class Cells:
 
     comments: tuple[str, ...]
     numbers: dict[str, Array]
-    station: Array | None
-    station_names: tuple[str, ...]
+    texts: Mapping[str, Names]
     lines: Sequence[int]
     dates: Array | None = None
     scale: str | None = None
     notes: tuple[str, ...] = ()
 
+    @property
+    def station(self) -> Array | None:
+        """(J,) indices into `station_names`, None without such a column."""
+        return self.texts[STATION].code if STATION in self.texts else None
+
+    @property
+    def station_names(self) -> tuple[str, ...]:
+        """Names of the stations, none without such a column."""
+        return self.texts[STATION].names if STATION in self.texts else ()
+
     def in_order(self, order: Array) -> Cells:
         """The same table with its rows in another order."""
         numbers = {name: column[order] for name, column in self.numbers.items()}
-        station = None if self.station is None else self.station[order]
+        texts = {name: Names(column.code[order], column.names) for name, column in self.texts.items()}
         dates = None if self.dates is None else self.dates[order]
         lines = np.asarray(self.lines)[order].tolist()
-        return replace(self, numbers=numbers, station=station, dates=dates, lines=lines)
+        return replace(self, numbers=numbers, texts=texts, dates=dates, lines=lines)
+
+    def renamed(self, name: Callable[[str], str]) -> Cells:
+        """The same table with other names in its columns of names."""
+        texts = {column: Names(found.code, tuple(map(name, found.names))) for column, found in self.texts.items()}
+        return replace(self, texts=texts)
 
 
 def read_cells(path: str | os.PathLike[str], named: Callable[[list[str]], list[str]] | None = None) -> Cells:
@@ -83,6 +105,41 @@ def read_cells(path: str | os.PathLike[str], named: Callable[[list[str]], list[s
         if b"\0" in content:
             raise ValueError("it is not text: it has zero bytes")
         content += file.read()
+    return cells_of(content, named)
+
+
+def cells_of(
+    content: bytes,
+    named: Callable[[list[str]], list[str]] | None = None,
+    texts: Collection[str] = (STATION,),
+    header: list[str] | None = None,
+) -> Cells:
+    """All columns of a text, as `read_cells` takes them from a file.
+
+    `texts` are those that hold names; `header` names the columns of a text whose first line is a row already.
+    """
+    comments, first, body, line, note = split(content)
+    if header is None:
+        header, line = parse_header(first, line), line + 1
+    else:
+        body = first + b"\n" + body if body else first
+    table = (body, line, header if named is None else named(header), comments, texts)
+    cells = (fast(*table) if len(body) >= SMALL else None) or parse_rows(*table)
+    return replace(cells, notes=(note,)) if note else cells
+
+
+class Parts(NamedTuple):
+    """A text as comments, the line behind them, the rows, the number of that line, and what to say of marks between cells."""
+
+    comments: tuple[str, ...]
+    first: bytes
+    body: bytes
+    line: int
+    note: str
+
+
+def split(content: bytes) -> Parts:
+    """The parts of a text with commas between cells; raises ValueError where there is nothing in it."""
     rest = content.removeprefix(b"\xef\xbb\xbf")
     rest = rest.replace(b"\r\n", b"\n") if b"\r" in rest else rest
     comments: list[str] = []
@@ -96,10 +153,7 @@ def read_cells(path: str | os.PathLike[str], named: Callable[[list[str]], list[s
             comments.append(_decoded(first[1:], line).strip())
         elif first.strip():
             first, body, note = with_commas(first, rest[start:].rstrip(b"\n"), line)
-            header = parse_header(first, line)
-            table = (body, line + 1, header if named is None else named(header), tuple(comments))
-            cells = (fast(*table) if len(body) >= SMALL else None) or parse_rows(*table)
-            return replace(cells, notes=(note,)) if note else cells
+            return Parts(tuple(comments), first, body, line, note)
     raise ValueError("the file is empty: no line names its columns")
 
 
@@ -156,14 +210,16 @@ def parse_header(first: bytes, line: int) -> list[str]:
     return header
 
 
-def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -> Cells | None:
+def fast(
+    body: bytes, line: int, header: list[str], comments: tuple[str, ...], texts: Collection[str] = (STATION,)
+) -> Cells | None:
     """The table where every line is one regular row of plain cells, else None."""
     if any(odd in body for odd in _ODD) or not _is_regular(body, len(header)):
         return None
     import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 
-    texts = dated(header, body[: body.find(b"\n")].split(b","))
-    kinds = {i: str if name == STATION or i == texts.column else float for i, name in enumerate(header) if name}
+    when = dated(header, body[: body.find(b"\n")].split(b","))
+    kinds = {i: str if name in texts or i == when.column else float for i, name in enumerate(header) if name}
     try:
         table = pd.read_csv(
             io.BytesIO(body), header=None, index_col=False, usecols=list(kinds), dtype=kinds, na_values=[""],
@@ -174,22 +230,21 @@ def fast(body: bytes, line: int, header: list[str], comments: tuple[str, ...]) -
     numbers = {name: np.ascontiguousarray(table[i], dtype=float) for i, name in enumerate(header) if kinds.get(i) is float}
     if any(_is_binary(column) for column in numbers.values()) and any(word in body for word in _WORDS):
         return None
-    station: Array | None = None
-    names: tuple[str, ...] = ()
-    if STATION in header:
-        codes, given = pd.factorize(table[header.index(STATION)])
-        station, names = _merged(np.asarray(codes, dtype=np.int64), [str(name).strip() for name in given])
-        if "" in names or (station < 0).any():
+    named: dict[str, Names] = {}
+    for name in (name for name in header if name in texts):
+        codes, given = pd.factorize(table[header.index(name)])
+        named[name] = _merged(np.asarray(codes, dtype=np.int64), [str(name).strip() for name in given])
+        if "" in named[name].names or (named[name].code < 0).any():
             return None
     dates = None
-    if texts.column >= 0:
-        if table[texts.column].isna().any():
+    if when.column >= 0:
+        if table[when.column].isna().any():
             return None  # the careful way says in which line a date is missing
         try:
-            dates = as_bytes(table[texts.column].to_numpy())
+            dates = as_bytes(table[when.column].to_numpy())
         except ValueError:
             return None
-    return Cells(comments, numbers, station, names, range(line, line + len(table)), dates, texts.scale)
+    return Cells(comments, numbers, named, range(line, line + len(table)), dates, when.scale)
 
 
 def _exact(version: str) -> dict[str, str]:
@@ -226,20 +281,22 @@ def _is_binary(column: Array) -> bool:
     return all(bool(((part == 0) | (part == 1) | np.isnan(part)).all()) for part in (column[:100], column))
 
 
-def _merged(index: Array, given: list[str]) -> tuple[Array, tuple[str, ...]]:
+def _merged(index: Array, given: list[str]) -> Names:
     """Indices into different names where several may be the same; -1 stays."""
     names = {name: i for i, name in enumerate(dict.fromkeys(given))}
-    return np.array([*(names[name] for name in given), -1], dtype=np.int64)[index], tuple(names)
+    return Names(np.array([*(names[name] for name in given), -1], dtype=np.int64)[index], tuple(names))
 
 
-def parse_rows(body: bytes, line: int, header: list[str], comments: tuple[str, ...] = ()) -> Cells:
+def parse_rows(
+    body: bytes, line: int, header: list[str], comments: tuple[str, ...] = (), texts: Collection[str] = (STATION,)
+) -> Cells:
     """The table row by row; raises ValueError at the first cell that does not fit."""
     text = _decoded(body, line)
-    texts: Dated | None = None
+    when: Dated | None = None
     dates: list[str] = []
-    columns: dict[str, list[float]] = {name: [] for name in header if name not in ("", STATION)}
-    stations: dict[str, int] = {}
-    station: list[int] = []
+    columns: dict[str, list[float]] = {name: [] for name in header if name and name not in texts}
+    known: dict[str, dict[str, int]] = {name: {} for name in header if name in texts}
+    index: dict[str, list[int]] = {name: [] for name in known}
     lines: list[int] = []
     reader = csv.reader(_split(text), strict=True)
     try:
@@ -250,24 +307,24 @@ def parse_rows(body: bytes, line: int, header: list[str], comments: tuple[str, .
             if len(row) != len(header):
                 cells = f"{len(row)} cell{'s' * (len(row) != 1)}"
                 raise ValueError(f"line {at} has {cells}; the header names {len(header)} ({', '.join(header)[:200]})")
-            texts = texts or dated(header, row)
+            when = when or dated(header, row)
             for i, (name, cell) in enumerate(zip(header, row, strict=True)):
                 if not name:
                     continue
-                if i == texts.column:
+                if i == when.column:
                     dates.append(_date(cell, at))
-                elif name == STATION:
-                    station.append(stations.setdefault(_name(cell, at), len(stations)))
+                elif name in known:
+                    index[name].append(known[name].setdefault(_name(cell, name, at), len(known[name])))
                 else:
                     columns[name].append(_number(cell, name, at))
             lines.append(at)
     except csv.Error as error:
         raise ValueError(f"line {line + reader.line_num - 1}: {error}") from None
-    texts = texts or dated(header, ())
-    numbers = {name: np.array(column, dtype=float) for name, column in columns.items() if header.index(name) != texts.column}
-    index = np.array(station, dtype=np.int64) if STATION in header else None
-    given = as_bytes(np.array(dates, dtype=object)) if texts.column >= 0 else None
-    return Cells(comments, numbers, index, tuple(stations), lines, given, texts.scale)
+    when = when or dated(header, ())
+    numbers = {name: np.array(column, dtype=float) for name, column in columns.items() if header.index(name) != when.column}
+    named = {name: Names(np.array(index[name], dtype=np.int64), tuple(found)) for name, found in known.items()}
+    given = as_bytes(np.array(dates, dtype=object)) if when.column >= 0 else None
+    return Cells(comments, numbers, named, lines, given, when.scale)
 
 
 class Dated(NamedTuple):
@@ -316,9 +373,9 @@ def _split(text: str) -> list[str]:
     return [part + "\n" for part in text.split("\n")]
 
 
-def _name(cell: str, line: int) -> str:
+def _name(cell: str, column: str, line: int) -> str:
     if not cell.strip():
-        raise ValueError(f"line {line}: the station has no name")
+        raise ValueError(f"line {line}: the {column} has no name")
     return cell.strip()
 
 
