@@ -137,3 +137,25 @@ def test_files_that_are_no_tracking_are_refused_in_one_line(files, capsys):
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 2
     assert "No such file" in lines[1]
+
+
+def test_a_table_of_fixes_is_tracking_for_a_scenario_without_stations(files):
+    found, _ = recorded(files / "one.oem", files / "s.toml", Recording(sigma=("2m", "0.1m/s")))[:2]
+    r, v = pz.propagate_kepler(R, V, GM, T)
+    week = (EPOCH - pz.Epoch("1980-01-06T00:00:00 GPS") + T) / 604800.0
+    rows = [
+        f"{np.floor(w):.0f},{604800.0 * (w - np.floor(w)):.9f},{x},{y},{z}"
+        for w, (x, y, z) in zip(week, (r / 1e3).tolist(), strict=True)
+    ]
+    (files / "a.csv").write_text("\n".join(["gps_week,gps_tow,X,Y,Z", *rows]) + "\n")
+    said = Recording(
+        columns={"week": "gps_week", "sow": "gps_tow", "x": "X[km]", "y": "Y[km]", "z": "Z[km]"}, frame="GCRF", sigma=("2m",)
+    )
+    problem, tracking = recorded(files / "a.csv", files / "s.toml", said)
+    given, true = orbit(problem, tracking)
+    np.testing.assert_allclose(given[:3], true[:3], atol=1e-2)
+    np.testing.assert_allclose(given[3:], true[3:], atol=1e-4)
+    assert problem.epoch - found.epoch == pytest.approx(0.0, abs=1.0)
+    columns = "week=gps_week sow=gps_tow x=X[km] y=Y[km] z=Z[km]"
+    words = ["--scenario", f"{files}/s.toml", "--columns", columns, "--frame", "GCRF", "--sigma", "2m", "--with", "batch"]
+    assert main(["compare", f"{files}/a.csv", *words]) == 0

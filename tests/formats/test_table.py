@@ -26,10 +26,8 @@ def test_precise_orbits_as_weeks_and_kilometres_are_the_same_fixes(tmp_path, dat
     given = given[given.object == given.participants.index("G01")]
     past = np.array([given.instant(int(k)) - pz.Epoch("1980-01-06T00:00:00 GPS") for k in range(0, len(given), 3)])
     week = np.floor(past / 604800.0)
-    lines = [
-        f"{w:.0f};{s!r};{x!r};{y!r};{z!r};ok"
-        for w, s, (x, y, z) in zip(week, past - 604800.0 * week, xyz(given) / 1e3, strict=True)
-    ]
+    parts = zip(week.tolist(), (past - 604800.0 * week).tolist(), (xyz(given) / 1e3).tolist(), strict=True)
+    lines = [f"{w:.0f};{s};{x};{y};{z};ok" for w, s, (x, y, z) in parts]
     path = table(tmp_path, "gps_week;gps_tow;X;Y;Z;flag\n" + "\n".join(lines) + "\n")
     said = "week=gps_week sow=gps_tow x=X[km] y=Y[km] z=Z[km]"
     rows = pz.read_tracking(path, columns=said, scale="GPS", frame="ITRF", sigma="0.1m")

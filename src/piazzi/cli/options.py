@@ -53,8 +53,8 @@ def recording(function: F) -> F:
         from piazzi.scenarios import Recording
         from piazzi.tables.names import parse_columns
 
-        tracked = [rest.pop(name) for name in ("chosen", "sigma", "stations")]
-        return function(*args, recording=Recording(parse_columns(columns or ""), scale, *tracked), **rest)
+        words = {name: rest.pop(name) for name in ("chosen", "sigma", "stations", "frame")}
+        return function(*args, recording=Recording(parse_columns(columns or ""), scale, **words), **rest)
 
     scales = click.Choice(SCALES, case_sensitive=False)
     said = f"Time scale of dates in CSV input that name none: {', '.join(SCALES)}."
@@ -64,6 +64,7 @@ def recording(function: F) -> F:
         command
     )
     command = click.option("--object", "chosen", metavar="NAME", help="Object in tracking of several.")(command)
+    command = click.option("--frame", metavar="AXES", help="Of fixes that do not say it: ITRF, EME2000, ...")(command)
     command = click.option("--scale", metavar="SCALE", type=scales, help=said)(command)
     return cast(F, click.option("--columns", metavar="NAMES", help=text)(command))
 

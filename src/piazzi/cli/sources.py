@@ -76,7 +76,13 @@ def is_tracking(source: str, scenario: str | None) -> bool:
     from piazzi.loading import KINDS
     from piazzi.scenarios import names
 
-    return bool(scenario) and not source.lower().endswith(KINDS) and source not in (STDIN, *names())
+    if not scenario or source in (STDIN, *names()):
+        return False
+    if source.lower().endswith(".csv"):
+        from piazzi.determination.recorded import measures_nothing
+
+        return measures_nothing(scenario)
+    return not source.lower().endswith(KINDS)
 
 
 def _say_moved_prior(found: Source, scenario: str | None) -> None:

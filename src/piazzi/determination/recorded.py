@@ -47,8 +47,8 @@ def recorded(path: str | os.PathLike[str], scenario: str | os.PathLike[str], sai
     """
     tables, faults = tables_of(scenario)
     usual = _recording(tables)
-    sigma = said.sigma or usual.sigma
-    observations = read_tracking(path, **({"sigma": list(sigma)} if sigma else {}))
+    words = {name: getattr(said, name) or getattr(usual, name) for name in ("sigma", "columns", "scale", "frame")}
+    observations = read_tracking(path, **{name: word for name, word in words.items() if word})
     found = measured(of_object(observations, said.chosen or usual.chosen), list(said.stations or usual.stations) or None)
     name = os.path.basename(os.fspath(scenario)).removesuffix(".toml")
     read = None if faults else read_scenario(_with_measurements(tables, found, os.fspath(path)), name, faults)
@@ -67,7 +67,16 @@ def _recording(tables: Mapping[str, Any]) -> Recording:
     given = tables.get("recording")
     given = given if isinstance(given, Mapping) else {}
     listed = {key: [given[key]] if isinstance(given.get(key), str) else given.get(key) or [] for key in ("sigma", "stations")}
-    return Recording(chosen=given.get("object"), sigma=tuple(listed["sigma"]), stations=tuple(listed["stations"]))
+    columns = given.get("columns")
+    return Recording(
+        columns=columns if isinstance(columns, Mapping) else {}, scale=given.get("scale"), frame=given.get("frame"),
+        chosen=given.get("object"), sigma=tuple(listed["sigma"]), stations=tuple(listed["stations"]),
+    )  # fmt: skip
+
+
+def measures_nothing(scenario: str | os.PathLike[str]) -> bool:
+    """Whether a scenario has no stations of its own, so that a table is tracking for it."""
+    return "stations" not in tables_of(scenario)[0]
 
 
 def _with_measurements(tables: Mapping[str, Any], found: Measured, path: str) -> dict[str, Any]:

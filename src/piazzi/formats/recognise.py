@@ -153,7 +153,8 @@ def _opened(path: str | os.PathLike[str], named: bool = False) -> tuple[bytes, F
     if found is None and named:
         found = TABLE
     if found is None:
-        hint = '; of a table say the columns, as --columns "time=T range=RNG[km]"' if b"," in data[:HEAD] else ""
+        parted = any(mark in data[:HEAD] for mark in b",;\t")
+        hint = '; of a table say the columns, as --columns "time=T range=RNG[km]"' if parted else ""
         raise ValueError(f"{name}: line 1: the file is of no format that is known: {', '.join(_names())}{hint}")
     return data, FORMATS[found], name
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from piazzi.formats.kinds import KINDS
 from piazzi.tables.cells import STATION, TIME, split
-from piazzi.tables.names import SECONDS, WEEK, parts, renamed
+from piazzi.tables.names import IGNORE, SECONDS, WEEK, parts, renamed
 from piazzi.text import nearest
 from piazzi.units import Units
 
@@ -47,13 +47,13 @@ class Header:
         self.header = header
         plain = [_sigma(name) for name in header]
         out = renamed(plain, KNOWN, self.columns, "is nothing that is measured")
-        ours = [TIME, WEEK, SECONDS, *KNOWN]
+        ours, ignored = [TIME, WEEK, SECONDS, *KNOWN], self.columns.get(IGNORE, "").split(",")
         labels = [name if parts(name)[0] == TIME else parts(name)[0] for name in out]
         for name, label, theirs in zip(out, labels, header, strict=True):
             bare = parts(name)[0]
-            if bare and bare not in ours:
-                self.strange.append(theirs)
-            elif bare and bare not in (TIME, *PEOPLE, WEEK, SECONDS):
+            if bare not in ours:
+                self.strange += [theirs] if parts(theirs)[0] not in ignored else []
+            elif bare not in (TIME, *PEOPLE, WEEK, SECONDS):
                 self._unit(label, parts(name)[1], theirs)
         kept = [label if parts(name)[0] in ours else "" for name, label in zip(out, labels, strict=True)]
         self._check([parts(name)[0] for name in kept])

@@ -51,6 +51,7 @@ class Recording:
     chosen : the object, in files of tracking of several
     sigma : standard deviations that such files do not say, as ``range.BER=10m``
     stations : files of stations for them
+    frame : axes of fixes that do not say theirs
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -58,6 +59,7 @@ class Recording:
     chosen: str | None = None
     sigma: tuple[str, ...] = ()
     stations: tuple[str, ...] = ()
+    frame: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +89,10 @@ def read_recording(table: Table) -> Recording:
     """The section [recording]: names of columns, and the scale of dates."""
     inner = table.table("columns")
     columns = {ours: theirs for ours in inner.data if (theirs := inner.text(ours))}
-    scale, chosen = table.text("scale"), table.text("object")
+    scale, chosen, frame = table.text("scale"), table.text("object"), table.text("frame")
     sigma, stations = table.texts("sigma"), table.texts("stations")
     table.finish()
-    return Recording(columns, scale, chosen, sigma, stations)
+    return Recording(columns, scale, chosen, sigma, stations, frame)
 
 
 def read_plan(table: Table) -> Plan:
