@@ -141,7 +141,7 @@ def test_files_that_are_no_tracking_are_refused_in_one_line(files, capsys):
 
 def test_a_table_of_fixes_is_tracking_for_a_scenario_without_stations(files):
     found, _ = recorded(files / "one.oem", files / "s.toml", Recording(sigma=("2m", "0.1m/s")))[:2]
-    r, v = pz.propagate_kepler(R, V, GM, T)
+    r, _ = pz.propagate_kepler(R, V, GM, T)
     week = (EPOCH - pz.Epoch("1980-01-06T00:00:00 GPS") + T) / 604800.0
     rows = [
         f"{np.floor(w):.0f},{604800.0 * (w - np.floor(w)):.9f},{x},{y},{z}"
