@@ -45,7 +45,7 @@ def command(files: tuple[str, ...], **given: Any) -> int:
 
     Exit status: 0 determined, 2 bad usage or input, 3 not determined.
     """
-    case = said_case(given)
+    files, case = said_case(files, given)
     if case.each and case.object:
         raise click.UsageError("--object and --each do not go together", click.get_current_context())
     _check_outputs(case)
@@ -53,6 +53,7 @@ def command(files: tuple[str, ...], **given: Any) -> int:
         from piazzi.formats import read_ephemeris
 
         read_ephemeris(case.against)  # what is wrong with it is said before the work
+    from piazzi.determination.case_text import write_case
     from piazzi.determination.determining import objects_in
 
     status = DONE
@@ -63,6 +64,9 @@ def command(files: tuple[str, ...], **given: Any) -> int:
             continue
         result = _one(files, own)
         wrote = _write(result, own)
+        if own.save is not None:
+            write_case(own.save, own, result.setup)
+            wrote.append(f"Wrote {own.save}")
         status = max(status, _status(result, case.strict))
         _print(result, case, wrote)
     return status
@@ -103,6 +107,10 @@ def _check_outputs(case: Case) -> None:
     doubled = [path for i, path in enumerate(case.output) if path in case.output[:i]]
     if doubled:
         raise click.UsageError(f"-o {doubled[0]} is given twice", click.get_current_context())
+    if case.save is not None:
+        if case.each:
+            raise click.UsageError("--save and --each do not go together", click.get_current_context())
+        output.check_output(case.save, (".toml",), "--save")
     results.check_report(case.report)
 
 

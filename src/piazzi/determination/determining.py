@@ -13,6 +13,7 @@ import numpy as np
 from piazzi.determination.analysis import Analysis, analysed
 from piazzi.determination.approach import approached
 from piazzi.determination.case import Case
+from piazzi.determination.case_file import split
 from piazzi.determination.editing import edited
 from piazzi.determination.fit import estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
@@ -39,9 +40,9 @@ def determine(
     guess: Any = None,
     stations: Any = None,
     with_: Any = None,
-    forces: Any = "default",
-    estimate: Any = (),
-    consider: Any = (),
+    forces: Any = None,
+    estimate: Any = None,
+    consider: Any = None,
     mass: float | None = None,
     area: float | None = None,
     com: float | None = None,
@@ -56,13 +57,14 @@ def determine(
 
     Parameters
     ----------
-    tracking : files, or `Observations`, put together
+    tracking : files, or `Observations`, put together; a file ``.toml`` among them is a case, which the words override
     guess : where to begin: text, ``"a=7078km e=0.001 i=98.2deg raan=10deg argp=0deg nu=0deg epoch=2026-11-03T04:12:00Z"``
         or ``"x=7000km ... vz=7.5km/s epoch=..."``; a file (OEM, OPM, TLE, OMM, SP3, CPF, an earlier determination's JSON); a
         `Guess`.  None, or "none": all orbits that fit are looked for.
     stations : files, `earth.Station` objects or a `StationList`; "ilrs" are those of the package
     with_ : estimators, as the command line writes them; the first is the answer.  Default the graph.
-    forces : "default" (by height), "none", text such as ``"gravity=EGM2008 degree=40 drag=exponential"``, or `earth.Forces`
+    forces : "default" (by height, as without it), "none", text such as ``"gravity=EGM2008 degree=40 drag=exponential"``, or
+        `earth.Forces`
     estimate, consider : further unknowns, ``"cr"``, and constants that are uncertain, ``{"cr": 0.1}``
     mass, area, com : kg, m2; and what a range is shorter by than to the centre of mass, m
     epoch : where the answer stands; default the last measurement
@@ -80,7 +82,8 @@ def determine(
         For what is wrong with the input or open, with the option that says it.
     """
     words = {name: value for name, value in locals().items() if name not in ("tracking", "announce", "notes", "conventions")}
-    return determined(tracking, Case.of({**words, **conventions}), announce, notes)
+    files, case = split(tracking)
+    return determined(files, case.told({**words, **conventions}), announce, notes)
 
 
 def determined(
@@ -97,15 +100,16 @@ def determined(
     say("reading")
     given = prepared(*tracking, case=case)
     say("approaching")
-    return solved(approached(given), chosen, axes, scale, say, notes or {})
+    return solved(approached(given), chosen, axes, scale, say, notes or {}, case)
 
 
 def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
     """The problem and tracking that `determine` solves, of a case or of the same words; raises as it does."""
-    case = Case.of(words) if case is None else case
+    files, told = split(tracking)
+    case = told.told(words) if case is None else case
     _, at = _instant(case.epoch)
-    rows = of_object(_observations(tracking, case.answers), case.object)
-    seen = measured(rows, case.stations, com=case.com, corrections=case.answers.get("corrections"))
+    rows = of_object(_observations(files, case.answers), case.object)
+    seen = measured(rows, case.stations, com=case.com, corrections=case.answers.get("corrections"), name=case.object)
 
     def chosen(orbit: Guess) -> Chosen:
         found = chosen_forces(case.forces, orbit.state, name=seen.object, mass=case.mass, area=case.area)
@@ -127,6 +131,7 @@ def solved(
     scale: str = "UTC",
     announce: Callable[[str], None] = lambda step: None,
     notes: Mapping[str, Any] | None = None,
+    case: Case | None = None,
 ) -> Determination:
     """The determination of a problem by estimators, of which the first is the answer."""
     found: dict[str, Estimate] = {}
@@ -140,7 +145,8 @@ def solved(
     seconds = time.perf_counter() - started
     announce("testing")
     sentences = verdict(given, answer, found, analysis, keep, reasons)
-    return Determination(given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}))
+    case = Case() if case is None else case
+    return Determination(given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}), case)
 
 
 def _answered(given: Setup, estimator: Estimator) -> tuple[Array, Array, Estimate, Analysis | None]:

@@ -66,7 +66,12 @@ class Measured:
 
 
 def measured(
-    observations: Observations, stations: Any = None, *, com: float | None = None, corrections: str | None = None
+    observations: Observations,
+    stations: Any = None,
+    *,
+    com: float | None = None,
+    corrections: str | None = None,
+    name: str | None = None,
 ) -> Measured:
     """Sensors, stations and tracking of observations of one object.
 
@@ -76,6 +81,7 @@ def measured(
     stations : see `sites.sites_of`; default those of the ILRS for lasers
     com : what ranges are shorter by than to the centre of mass, m; default by the object's name
     corrections : "applied" or "open", whether media are corrected for already where the files do not say it
+    name : of the object, where the files do not say it
 
     Raises
     ------
@@ -99,7 +105,8 @@ def measured(
     _check_sigmas(everything, index)
     epoch = Epoch.at(float(everything.epoch.whole + np.floor(everything.t[index[0]])))
     known = everything.objects
-    context = Context(everything, epoch, sites, known[0] if known else "", com, corrections == "applied", corrections == "open")
+    own = known[0] if known else name or ""
+    context = Context(everything, epoch, sites, own, com, corrections == "applied", corrections == "open")
     parts = _parts(context, index)
     sensors, places, names, labels = _stations(parts)
     times = np.concatenate([part.t for part in parts]) + (everything.epoch - epoch)
@@ -133,9 +140,12 @@ def _check_sigmas(observations: Observations, index: Array) -> None:
 
 
 def of_object(observations: Observations, chosen: str | None) -> Observations:
-    """The rows of one object; raises ValueError with the list where there are several, or not that one."""
+    """The rows of one object; raises ValueError with the list where there are several, or not that one.
+
+    Rows of which no file says what they are of are of any object.
+    """
     known = observations.objects
-    if chosen is None:
+    if chosen is None or not known:
         if len(known) > 1:
             more = f" and {len(known) - 8} more" if len(known) > 8 else ""
             raise ValueError(
