@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from piazzi.cli import output, results
+from piazzi.cli import options, output, results
 from piazzi.cli.case import WithCase, case_options, said_case
 from piazzi.cli.conventions import conventions
 from piazzi.cli.running import DONE, NOT_ESTIMATED, say
@@ -45,10 +45,11 @@ def command(files: tuple[str, ...], **given: Any) -> int:
 
     Exit status: 0 determined, 2 bad usage or input, 3 not determined.
     """
+    read = files
     files, case = said_case(files, given)
     if case.each and case.object:
         raise click.UsageError("--object and --each do not go together", click.get_current_context())
-    _check_outputs(case)
+    _check_outputs(case, read)
     if case.against is not None:
         from piazzi.formats import read_ephemeris
 
@@ -94,9 +95,12 @@ def _one(files: Sequence[str], case: Case) -> Determination:
     return replace(found, notes={**found.notes, "against": {"file": case.against, **difference}})
 
 
-def _check_outputs(case: Case) -> None:
+def _check_outputs(case: Case, files: Sequence[str]) -> None:
     """Refuse what could not be written, before anything is read."""
     from piazzi.determination.products import ENDINGS
+
+    for path in (*case.output, case.save):
+        options.check_places({"files": files, "output_file": path})
 
     for path in case.output:
         if path == output.STDOUT:

@@ -14,6 +14,7 @@ from piazzi.determination.case import OPTIONS, Case
 from piazzi.determination.fit import DEFAULT
 from piazzi.determination.setup import Setup
 from piazzi.earth import Epoch, ForceChoice, Forces
+from piazzi.earth.defaults import DATA
 from piazzi.formats import KINDS, Observations
 from piazzi.io.atomic import atomic_path
 from piazzi.scenarios.functions import written_orientation
@@ -103,9 +104,20 @@ def _forces(choice: Any, folder: Path) -> Any:
         table[field.name] = _plain(field.name, value, folder if field.name == "gravity" else None)
     open_ = {text.partition(" = ")[0] for text in choice.assumed}
     own = {k: float(v) for k, v in choice.values.items() if k not in open_ and forces.values.get(k) != v}
-    data = {"eop": None if choice.eop is None else written_orientation(choice.eop)}
-    data["kernel"] = None if choice.kernel is None else str(Path(choice.kernel).absolute())
-    return {**table, **own, **{key: value for key, value in data.items() if value is not None}}
+    return {**table, **own, **_data(choice)}
+
+
+def _data(choice: ForceChoice) -> dict[str, Any]:
+    """Files of data that were named, and constants of the orientation."""
+    found: dict[str, Any] = {} if choice.eop is None else {"eop": written_orientation(choice.eop)}
+    for name in DATA:
+        value = getattr(choice, name)
+        if value is not None and name not in found:
+            path = Path(getattr(value, "source", value))
+            if not path.is_file():
+                raise ValueError(f"the case cannot be written to a file: its {name} is from no file that is there")
+            found[name] = str(path.absolute())
+    return found
 
 
 def _plain(name: str, value: Any, folder: Path | None) -> Any:

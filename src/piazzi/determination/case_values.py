@@ -59,7 +59,7 @@ def instant(value: Any, where: str) -> Any:
 
 def span(value: Any, where: str) -> Any:
     """Two ends with .. between them."""
-    from piazzi.determination.products import check_span
+    from piazzi.determination.arcs import check_span
 
     check_span(value)
     return value

@@ -146,7 +146,9 @@ def solved(
     announce("testing")
     sentences = verdict(given, answer, found, analysis, keep, reasons)
     case = Case() if case is None else case
-    return Determination(given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}), case)
+    return Determination(
+        given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}), case
+    )
 
 
 def _answered(given: Setup, estimator: Estimator) -> tuple[Array, Array, Estimate, Analysis | None]:

@@ -160,7 +160,7 @@ class Determination:
 
     def ephemeris(self, span: Any = None, step: float | None = None, frame: str | None = None) -> Any:
         """States and covariances over a span, an `Ephemeris`; default the rows that were used, to the solution."""
-        from piazzi.determination.products import ephemeris
+        from piazzi.determination.arcs import ephemeris
 
         return ephemeris(self, span, step, frame)
 

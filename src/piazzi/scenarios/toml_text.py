@@ -26,17 +26,18 @@ def toml_text(tables: Mapping[str, Any], comments: tuple[str, ...] = ()) -> str:
 
 
 def _lines(table: Mapping[str, Any], path: str) -> Iterator[str]:
-    """The keys of a table, then its tables as sections: what follows a section would belong to it."""
-    later: list[tuple[str, Any]] = []
+    """The keys of a table, then its tables as sections, all of them where one is: what follows a section would belong to it."""
+    lines, later = dict[str, str](), dict[str, Any]()
     for key, value in table.items():
-        if value is None:
-            continue
-        line = "" if _is_section(value, path) else f"{_key(key)} = {_value(value)}"
-        if line and (len(line) <= WIDTH or not isinstance(value, Mapping)):
-            yield line
-        else:
-            later.append((key, value))
-    for key, value in later:
+        if value is not None and not _is_section(value, path):
+            lines[key] = f"{_key(key)} = {_value(value)}"
+    long = any(len(line) > WIDTH for key, line in lines.items() if isinstance(table[key], Mapping))
+    for key, value in table.items():
+        if key in lines and not (long and isinstance(value, Mapping)):
+            yield lines[key]
+        elif value is not None:
+            later[key] = value
+    for key, value in later.items():
         place = f"{path}.{_key(key)}" if path else _key(key)
         if isinstance(value, Mapping):
             yield from ("", f"[{place}]", *_lines(value, place))
