@@ -12,9 +12,9 @@ from piazzi.scenarios.toml_text import toml_text
 def test_values_keep_all_bits_and_keys_their_order():
     rng = np.random.default_rng(0)
     table = {
-        "text": 'a "b" \\ \n\t é \x7f \x01', "number": 0.1 + 0.2, "small": 5e-324, "whole": -3, "flag": True, "not a bare key": "x",
+        "text": 'a "b" \\ \n\t é \x7f \x01', "number": 0.1 + 0.2, "small": 5e-324, "whole": -3, "flag": True, "not bare": "x",
         "list": rng.standard_normal(50).tolist(), "nested": [[1.0, 2.0], [3.0, 4.0]], "empty": [], "none": {},
-        "functions": {"short": {"kind": "a"}, "long": {"kind": "b", "values": rng.standard_normal(40).tolist()}, "last": {"kind": "c"}},
+        "functions": {"short": {"kind": "a"}, "long": {"values": rng.standard_normal(40).tolist()}, "last": {"kind": "c"}},
         "stations": [{"name": "one", "place": {"of": [{"x": 1.0}, {"x": 2.0}]}}, {"name": "two", "numbers": {"a.b": 1e300}}],
         "sensors": {"range": {"components": {"range": {"equation": "x", "unit": "m"}}, "definitions": {"a, b": "f(x)"}}},
     }  # fmt: skip
