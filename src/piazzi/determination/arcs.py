@@ -11,7 +11,7 @@ from piazzi.earth import Epoch
 from piazzi.earth.rotation import frame_named
 from piazzi.formats import Arc, Ephemeris
 
-STEP = 60.0  # s
+STEP, DAILY = 60.0, 86400.0  # s, of an orbit about the Earth and about the Sun
 MOST_STATES = 200_000
 
 
@@ -75,7 +75,8 @@ def ephemeris(
     What is not given is what the case says.
     """
     begin, end = dates_of(found, found.case.span if span is None else span)
-    width = found.case.step or STEP if step is None else float(step)
+    usual = STEP if found.setup.measured.about == "earth" else DAILY
+    width = found.case.step or usual if step is None else float(step)
     if not width > 0:
         raise ValueError(f"--step is {width:g} s; it must be positive")
     length = end - begin
@@ -105,7 +106,7 @@ def arc_of(found: Any, begin: Epoch, t: Any, frame: str | None, formal: bool | N
     spacecraft = {"mass": case.mass, "drag_area": case.area, "radiation_area": case.area}
     return Arc(
         epoch=begin, t=t, position=mean[:, :3], velocity=mean[:, 3:], name=found.object or "UNKNOWN",
-        identifier=case.identifier or "", centre="EARTH", frame=orbit.frame, scale=scale_of(found), covariance_t=t[own],
+        identifier=case.identifier or "", centre=found.setup.measured.about.upper(), frame=orbit.frame, scale=scale_of(found), covariance_t=t[own],
         covariance=roots @ np.swapaxes(roots, 1, 2), covariance_frames=(orbit.frame,) * int(own.sum()),
         interpolation=method, degree=degree,
         spacecraft=tuple((name, value) for name, value in spacecraft.items() if value is not None),

@@ -94,12 +94,19 @@ class Case:
     epoch: Any = said(None, "DATE", "Where the answer stands.  [default: the last measurement used]", read.instant)
     span: Any = asked(None, "'A .. B'", 'Of products, as "first .. last+3d".', read.span)
     step: float | None = asked(
-        None, "TIME", "Between states of products.  [default: 60s]", read.duration, section=("product", "step")
+        None,
+        "TIME",
+        "Between states of products.  [default: 60s, about the Sun a day]",
+        read.duration,
+        section=("product", "step"),
     )
     covariance: str = asked(
         "scaled", "KIND", "Covariances that the verdict calls too small: scaled, as the file says then, or formal.  "
         "[default: scaled]", choices=("scaled", "formal"),
     )  # fmt: skip
+    about: str | None = said(
+        None, "CENTRE", "What it goes about: earth or sun.  [default: what the measurements fit]", choices=("earth", "sun")
+    )
     object: str | None = said(None, "NAME", "Which object, in files of several.", section=("object", "name"))
     each: bool = asked(False, "", "Every object, one after the other; products by {object}.", read.flag)
     against: Any = asked(None, "FILE", "Compare with another orbit, at its rows within the span.", file=True)

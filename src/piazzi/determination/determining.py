@@ -21,7 +21,8 @@ from piazzi.determination.orbit_forces import Chosen, chosen_forces
 from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.determination.setup import Setup, posed, setup
-from piazzi.determination.unguided import unguided
+from piazzi.determination.sun_forces import forces_about_the_sun
+from piazzi.determination.unguided import goes_about_the_sun, unguided
 from piazzi.determination.unknowns import considered, estimated
 from piazzi.determination.verdict import verdict
 from piazzi.earth import Epoch
@@ -48,6 +49,7 @@ def determine(
     com: float | None = None,
     epoch: Any = None,
     frame: str | None = None,
+    about: str | None = None,
     object: str | None = None,  # noqa: A002  # as everywhere
     announce: Callable[[str], None] | None = None,
     notes: Mapping[str, Any] | None = None,
@@ -68,7 +70,8 @@ def determine(
     estimate, consider : further unknowns, ``"cr"``, and constants that are uncertain, ``{"cr": 0.1}``
     mass, area, com : kg, m2; and what a range is shorter by than to the centre of mass, m
     epoch : where the answer stands; default the last measurement
-    frame : axes of the answer, default GCRF; and of fixes whose file does not say them
+    frame : axes of the answer, default GCRF, about the Sun ICRF; and of fixes whose file does not say them
+    about : "earth" or "sun"; default the Sun where directions fit no orbit about the Earth
     object : name of what to determine, in files of several
     announce : called with the name of each step as it begins
     notes : kept in the result: the command
@@ -96,11 +99,12 @@ def determined(
     say = announce or (lambda step: None)
     chosen = estimators(case.with_)
     scale, _ = _instant(case.epoch)
-    axes = frame_named(case.frame) if case.frame else "GCRF"
+    axes = frame_named(case.frame) if case.frame else None
     say("reading")
     given = prepared(*tracking, case=case)
     say("approaching")
-    return solved(approached(given), chosen, axes, scale, say, notes or {}, case)
+    centre = given.measured.centre
+    return solved(approached(given), chosen, axes or centre.frame, scale or centre.scale, say, notes or {}, case)
 
 
 def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
@@ -109,14 +113,34 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
     case = told.told(words) if case is None else case
     _, at = _instant(case.epoch)
     rows = of_object(_observations(files, case.answers), case.object)
-    seen = measured(rows, case.stations, com=case.com, corrections=case.answers.get("corrections"), name=case.object)
+    seen, begin = _seen(rows, case)
 
     def chosen(orbit: Guess) -> Chosen:
-        found = chosen_forces(case.forces, orbit.state, name=seen.object, mass=case.mass, area=case.area)
+        if seen.about == "sun":
+            found = forces_about_the_sun(case.forces, orbit.state)
+        else:
+            found = chosen_forces(case.forces, orbit.state, name=seen.object, mass=case.mass, area=case.area)
         return considered(estimated(found, case.estimate, seen), case.consider, seen)
 
-    begin = _guess(case.guess, seen, case.object) or unguided(seen, lambda first: posed(seen, chosen(first), first))
+    begin = begin or unguided(seen, lambda first: posed(seen, chosen(first), first))
     return setup(seen, chosen(begin), begin, at=at)
+
+
+def _seen(rows: Observations, case: Case) -> tuple[Measured, Guess | None]:
+    """What was measured, by the centre that the user, the guess or the measurements say; and the guess where there is one."""
+
+    def by(about: str) -> Measured:
+        corrections = case.answers.get("corrections")
+        return measured(rows, case.stations, com=case.com, corrections=corrections, name=case.object, about=about)
+
+    seen = by(case.about or "earth")
+    begin = _guess(case.guess, seen, case.object)
+    about = begin.about if begin is not None else seen.about
+    if case.about is None and begin is None and goes_about_the_sun(seen):
+        about = "sun"
+    if case.about not in (None, about):
+        raise ValueError(f"--about {case.about}: the guess is about the {about.title()}")
+    return (seen if about == seen.about else by(about)), begin
 
 
 def objects_in(tracking: Sequence[Any], case: Case) -> list[str | None]:
@@ -191,18 +215,17 @@ def _observations(tracking: Sequence[Any], told: Mapping[str, Any]) -> Observati
     return concatenate([*([read_tracking(*paths, **told)] if paths else []), *ready])
 
 
-def _instant(epoch: Any) -> tuple[str, Epoch | None]:
-    """The scale to tell dates in, and where the answer stands."""
+def _instant(epoch: Any) -> tuple[str | None, Epoch | None]:
+    """The scale to tell dates in, where it is said, and where the answer stands."""
     if epoch is None:
-        return "UTC", None
-    scale = read_date(epoch).scale if isinstance(epoch, str) else "UTC"
-    return scale, Epoch(epoch)
+        return None, None
+    return read_date(epoch).scale if isinstance(epoch, str) else None, Epoch(epoch)
 
 
 def _guess(given: Any, seen: Measured, chosen: str | None) -> Guess | None:
     """The user's, or what fixes give by themselves; None where there is neither."""
     if given is not None and given != "none":
-        return guess_of(given, seen.first, chosen or seen.object or None)
+        return guess_of(given, seen.first, chosen or seen.object or None, seen.about)
     wide = {s.name for s in seen.stations if s.sensor in ("position", "position_velocity")}
     own = np.isin(seen.tracking.row_stations, list(wide)) & np.isfinite(seen.tracking.values[:, :3]).all(axis=1) if wide else []
     return from_fixes(seen.epoch, seen.tracking.row_times[own], seen.tracking.values[own, :3]) if np.any(own) else None

@@ -51,6 +51,8 @@ def write(found: Any, path: Any, *, span: Any = None, step: float | None = None,
     formal : whether covariances are written as computed where the verdict calls them too small; default what the case says
     """
     ending = check_ending(path)
+    if ending == ".tle" and found.setup.measured.about != "earth":
+        raise ValueError(f"-o {path}: two lines of elements are of orbits about the Earth; write .oem, .opm or .json")
     if ending == ".nc":
         _dataset(found, path)
         return

@@ -105,7 +105,7 @@ class Determination:
         def at(epochs: Sequence[Epoch]) -> tuple[Array, Array]:
             return beliefs(self.setup, self.estimate, epochs)
 
-        return Orbit(self.epoch, self.frame, at)
+        return Orbit(self.epoch, self.frame, at, self.setup.measured.centre)
 
     @property
     def modes(self) -> tuple[dict[str, Any], ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
@@ -12,7 +13,7 @@ import numpy as np
 from piazzi.determination.guesses import Guess
 from piazzi.determination.orbit_forces import Chosen
 from piazzi.determination.sensing import Measured
-from piazzi.earth import Epoch
+from piazzi.earth import EphemerisWarning, Epoch
 from piazzi.kernels import RungeKutta8
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.arcs import Steps, arc
@@ -103,10 +104,17 @@ def posed(
         stations=measured.stations,
         parameters=numbers,
         integrator=RungeKutta8(max_step=chosen.max_step),
-        functions={**chosen.choice.functions(measured.epoch, air), **measured.functions},
+        functions={**_data(chosen, measured.epoch, air), **measured.functions},
         epoch=measured.epoch,
         name=measured.object,
     )
+
+
+def _data(chosen: Chosen, epoch: Epoch, air: Any) -> Mapping[str, Any]:
+    """Data of the forces; where planets are by series a result says so, once."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", EphemerisWarning)
+        return chosen.choice.functions(epoch, air)
 
 
 def scale_of(given: Setup, first: Array) -> Array:
