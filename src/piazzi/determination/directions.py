@@ -38,12 +38,11 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
     if observations.place[index].max() >= 0:
         raise ValueError(f"{context.where}directions from observers that move are not determined from yet")
     number = int(observations.station[first])
-    geocentre = context.about == "sun" and number >= 0 and observations.participants[number] == GEOCENTRE
-    site = None if geocentre else context.site(number)
+    site = None if number >= 0 and observations.participants[number] == GEOCENTRE else context.site(number)
     tag = EVENTS[TAGS[observations.tag[first]] or segment.tag or "bounce"]
     if kinds == AZEL:
         if site is None or context.about == "sun":
-            raise ValueError(f"{context.where}azimuths and elevations are not determined from about the Sun")
+            raise ValueError(f"{context.where}azimuths and elevations are of stations, of an orbit about the Earth")
         bent = "radio" if context.open else None
         if not context.open:
             context.said["azimuths and elevations are free of refraction (--corrections open says otherwise)"] = None
@@ -53,7 +52,7 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
             raise ValueError(f"{context.where}what are the directions? --angles astrometric, geocentric or apparent")
         sensor = _ascension(segment.angles, frame_named(segment.frame or "GCRF"), tag, context.about)
     if site is None or context.about == "sun":
-        place = Place(site, context.epoch, about="sun")
+        place = Place(site, context.epoch, about=context.about)
         given = sensor.at(None, context.epoch, 1.0, name=GEOCENTRE if site is None else site.name, place=place)
     else:
         weather = weather_of(observations, index, site, context.epoch)[0]

@@ -259,7 +259,7 @@ def _apart(problem: Problem, tracking: Tracking, modes: tuple[OrbitMode, ...], c
         lines = [p - place for p in paths]
         far = [np.linalg.norm(line, axis=1) for line in lines]
         above = np.ones(len(t), dtype=bool)
-        if centre.name == "earth":
+        if centre.name == "earth" and place.any():
             up = place / np.linalg.norm(place, axis=1)[:, None]
             above = np.any([np.sum(line * up, axis=1) > 0.1 * d for line, d in zip(lines, far, strict=True)], axis=0)
         k = int(np.argmax(np.where(above, away, 0.0)))

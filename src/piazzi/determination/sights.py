@@ -169,7 +169,7 @@ def _directions(
         return out
     t, z, place = t[good], z[good], place[good]
     lon, lat = z[:, at[0]], z[:, at[1]]
-    if pair[0] == "azimuth":
+    if pair[0] == "azimuth":  # noqa: SIM108
         u = _from_horizon(given, station, t, lon, lat)
     else:
         u = _from_the_equator(given, station, t, lon, lat)

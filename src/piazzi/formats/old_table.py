@@ -70,8 +70,13 @@ def _night(rows: Rows, head: dict[str, str], cells: list[str], line: int) -> Non
     row = Row(day, seconds, head["station"], head["object"], segment, line)
     if ascension != "-":
         hours, _ = sexagesimal(ascension.replace(":", " "), "right ascension")
+        if not 0.0 <= hours < 24.0:
+            raise ValueError(f"right ascension {hours:g} h is on no sphere")
         rows.add(row, "right_ascension", math.radians(15.0 * hours))
     if declination == "minutes" or declination.count(":") == 1:
         rows.skip(_MINUTES)
     elif declination != "-":
-        rows.add(row, "declination", math.radians(sexagesimal(declination.replace(":", " "), "declination")[0]))
+        degrees, _ = sexagesimal(declination.replace(":", " "), "declination")
+        if abs(degrees) > 90.0:
+            raise ValueError(f"declination {degrees:g} deg is on no sphere")
+        rows.add(row, "declination", math.radians(degrees))
