@@ -106,7 +106,8 @@ def arc_of(found: Any, begin: Epoch, t: Any, frame: str | None, formal: bool | N
     spacecraft = {"mass": case.mass, "drag_area": case.area, "radiation_area": case.area}
     return Arc(
         epoch=begin, t=t, position=mean[:, :3], velocity=mean[:, 3:], name=found.object or "UNKNOWN",
-        identifier=case.identifier or "", centre=found.setup.measured.about.upper(), frame=orbit.frame, scale=scale_of(found), covariance_t=t[own],
+        identifier=case.identifier or "", centre=found.setup.measured.about.upper(), frame=orbit.frame,
+        scale=scale_of(found), covariance_t=t[own],
         covariance=roots @ np.swapaxes(roots, 1, 2), covariance_frames=(orbit.frame,) * int(own.sum()),
         interpolation=method, degree=degree,
         spacecraft=tuple((name, value) for name, value in spacecraft.items() if value is not None),
