@@ -12,6 +12,7 @@ import piazzi as pz
 from piazzi import kernels
 from piazzi.kernels.bundle import Belief, Beliefs, Gate, Given, Innovations, Measured, Run
 from piazzi.kernels.entries import definitions, flat, opened, signatures
+from piazzi.kernels.library import PlainEntry
 from piazzi.kernels.members import BUNDLES, MOST_KINDS
 from piazzi.problem.inputs import prepare
 
@@ -131,7 +132,7 @@ def test_also_after_a_call_that_did(case):
     entry(*good)
     with pytest.raises(TypeError, match="argument 3 of kernel evaluate_dynamics must be a Given, not ndarray"):
         entry(*good[:3], good[4], good[3])
-    with pytest.raises(TypeError, match="argument 0 of kernel evaluate_dynamics must be one whole number"):
+    with pytest.raises(TypeError, match=r"argument 0 of kernel evaluate_dynamics \(K: int K\) must be one whole number"):
         entry(good[1], good[0], *good[2:])
 
 
@@ -177,10 +178,63 @@ def test_arrays_by_themselves_are_checked_at_every_call(case):
     entry = kernels.load(problem.spec("transition", "rates")).evaluate_dynamics
     x, out, t = np.ones((2, n)), np.empty((2, n)), np.zeros(2)
     entry(2, t, x, problem.given_bundle, out)
-    with pytest.raises(TypeError, match="argument 1 of kernel evaluate_dynamics must be contiguous float64, not int64"):
+    with pytest.raises(
+        TypeError, match=r"argument 1 of kernel evaluate_dynamics \(t: K\) must be contiguous float64, not int64"
+    ):
         entry(2, np.arange(2), x, problem.given_bundle, out)
-    with pytest.raises(TypeError, match="argument 0 of kernel evaluate_dynamics must be one whole number"):
+    with pytest.raises(TypeError, match=r"argument 0 of kernel evaluate_dynamics \(K: int K\) must be one whole number"):
         entry(2.0, t, x, problem.given_bundle, out)
+
+
+LOOSE = {
+    "more states than times": (
+        lambda a: [3, *a[1:]],
+        r"argument 1 of kernel evaluate_dynamics \(t: K\) has shape \(2,\), but K is 3",
+    ),
+    "too few times": (lambda a: [a[0], a[1][:1], *a[2:]], r"\(t: K\) has shape \(1,\), but K is 2 elsewhere"),
+    "another state": (lambda a: [*a[:2], np.ones((2, 3)), *a[3:]], r"\(x: K N\) has shape \(2, 3\), but N is 4 elsewhere"),
+    "a transpose": (lambda a: [*a[:4], np.empty((4, 2))], r"\(out: K N\) has shape \(4, 2\), but K is 2 elsewhere"),
+    "flat": (lambda a: [*a[:4], np.empty(8)], r"\(out: K N\) has shape \(8,\); it must have 2 axes"),
+}
+
+
+@pytest.mark.parametrize("jit", ["1", "0"])
+@pytest.mark.parametrize("name", LOOSE)
+def test_arrays_by_themselves_have_the_size_that_the_entry_says(name, jit, case, monkeypatch):
+    """Also after a call that did: what was checked once is remembered by the shapes."""
+    monkeypatch.setenv("PIAZZI_JIT", jit)
+    problem, n = case[0], case[0].model.n
+    entry = kernels.load(problem.spec("transition", "rates")).evaluate_dynamics
+    good = [2, np.zeros(2), np.ones((2, n)), problem.given_bundle, np.empty((2, n))]
+    entry(*good)
+    change, message = LOOSE[name]
+    with pytest.raises((TypeError, ValueError), match=message):
+        entry(*change(good))
+
+
+def test_sizes_are_said_beside_the_entry():
+    sizes = 'K="K", t="D+1", count="D+1", work="7"'
+    text = f"@entry\n@sizes({sizes})\ndef go(K: int, t: Array, count: Indices, work: Array, w: Array):\n    pass\n"
+    takes = signatures(opened(text))["go"]
+    assert takes == ("K: int K", "t: D+1", "count: int64 D+1", "work: 7", "floats")
+    assert flat(takes) == ["integer", "floats", "indices", "floats", "floats"]
+    entry = PlainEntry("go", lambda *_: None, takes, {})
+    good = [3, np.zeros(3), np.zeros(3, dtype=np.int64), np.zeros(7), np.zeros((5, 5))]
+    entry(*good)
+    with pytest.raises(ValueError, match=r"argument 3 of kernel go \(work: 7\) has shape \(6,\), with 6 in place of 7"):
+        entry(*good[:3], np.zeros(6), good[4])
+    with pytest.raises(
+        ValueError, match=r"argument 2 of kernel go \(count: int64 D\+1\) has shape \(2,\), but D is 2 elsewhere"
+    ):
+        entry(*good[:2], good[2][:2], *good[3:])
+    with pytest.raises(ValueError, match="kernel entry 'go' has no argument 'y' to be of size 'K'"):
+        signatures(text.replace("t=", "y=").replace("D+1", "K"))
+
+
+def test_every_array_that_an_entry_of_the_package_takes_has_a_size():
+    for path in FRAGMENTS:
+        for name, takes in signatures(opened(path.read_text())).items():
+            assert not {"floats", "indices"} & set(takes), f"{path.stem}: {name} takes an array of any size"
 
 
 def test_members_are_seen_by_name_and_shared():

@@ -68,9 +68,9 @@ def builds(monkeypatch, compiled):
 
 
 def rate_at_two(library) -> float:
-    out = np.empty(1)
+    out = np.empty((1, 1))
     library.evaluate_dynamics(1, np.zeros(1), np.full((1, 1), 2.0), GIVEN, out)
-    return float(out[0])
+    return float(out[0, 0])
 
 
 def load_as_a_new_process() -> float:

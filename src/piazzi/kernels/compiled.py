@@ -47,6 +47,7 @@ from piazzi.kernels.lanes import (
 )
 from piazzi.kernels.lanes.elementary import HELPER, OPTIONS
 from piazzi.kernels.lanes.pieces import choose
+from piazzi.kernels.plain import sizes
 from piazzi.kernels.plain import unless_missing as _unless_missing
 
 # The language's functions: our own where there is one, else the C library's

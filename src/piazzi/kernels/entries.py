@@ -7,10 +7,11 @@ import re
 from collections.abc import Iterable
 
 from piazzi.kernels import bundle  # noqa: F401  # declares them
-from piazzi.kernels.members import BUNDLES, FLOATS, INDICES, INTEGER, REAL
+from piazzi.kernels.members import BUNDLES, FLOATS, INDICES, INTEGER, REAL, Slot
 
 _ANNOTATIONS = {FLOATS: "Array", INDICES: "Indices", INTEGER: "int", REAL: "float"}
 _KINDS = {annotation: kind for kind, annotation in _ANNOTATIONS.items()}
+_PREFIXES = {FLOATS: "", INDICES: "int64 ", INTEGER: "int "}
 
 
 def opened(text: str) -> str:
@@ -42,7 +43,10 @@ def definitions(text: str) -> str:
 
 
 def signatures(source: str) -> dict[str, tuple[str, ...]]:
-    """The arguments of each entry of a generated source: names of bundles, and kinds of what is passed by itself."""
+    """The arguments of each entry of a generated source: names of bundles, and what else is passed, as in "x: K N".
+
+    Of what has no size in the entry's `sizes`, the kind by itself.
+    """
     return {
         node.name: _signature(node) for node in ast.parse(source).body if isinstance(node, ast.FunctionDef) and is_entry(node)
     }
@@ -62,6 +66,10 @@ def _signature(node: ast.FunctionDef) -> tuple[str, ...]:
             ):
                 if [ast.unparse(a) for a in args] == [f"{target}_{slot}" for slot in BUNDLES[name].slots]:
                     bundles[ast.unparse(args[0])] = name
+    said = [k for d in node.decorator_list if isinstance(d, ast.Call) for k in d.keywords]
+    sized = {str(k.arg): ast.literal_eval(k.value) for k in said}
+    for name in sized.keys() - {a.arg for a in node.args.args}:
+        raise ValueError(f"kernel entry {node.name!r} has no argument {name!r} to be of size {sized[name]!r}")
     out, skip = [], 0
     for a in node.args.args:
         if skip:
@@ -70,10 +78,17 @@ def _signature(node: ast.FunctionDef) -> tuple[str, ...]:
             out.append(bundles[a.arg])
             skip = len(BUNDLES[bundles[a.arg]].slots) - 1
         else:
-            out.append(_KINDS[ast.unparse(a.annotation)] if a.annotation else "")
+            kind = _KINDS[ast.unparse(a.annotation)] if a.annotation else ""
+            out.append(f"{a.arg}: {_PREFIXES[kind]}{sized[a.arg]}" if a.arg in sized else kind)
     return tuple(out)
+
+
+def slot_of(argument: str) -> Slot:
+    """What an argument is that is no bundle."""
+    _, sized, text = argument.partition(": ")
+    return Slot.of(text) if sized else Slot(argument, None)
 
 
 def flat(signature: Iterable[str]) -> list[str]:
     """Kinds of what object code takes."""
-    return [k for kind in signature for k in ([s.kind for s in BUNDLES[kind].slots.values()] if kind in BUNDLES else [kind])]
+    return [s.kind for a in signature for s in (BUNDLES[a].slots.values() if a in BUNDLES else [slot_of(a)])]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.kernels.address import address
-from piazzi.kernels.entries import flat
+from piazzi.kernels.entries import flat, slot_of
 from piazzi.kernels.members import (
     BUNDLES,
     FLOATS,
@@ -20,7 +20,6 @@ from piazzi.kernels.members import (
     REAL,
     TYPES,
     Bundle,
-    Slot,
     check_array,
     checked,
 )
@@ -39,40 +38,36 @@ _NEVER_CALLED = (
 
 
 class _Callable:
-    """A function of bundles, arrays and numbers, which are checked: how many, of what kind, and the sizes of all bundles.
+    """A function of bundles, arrays and numbers, which are checked: how many, of what kind, and all sizes.
 
-    That is done once for every kind of problem.  Of an array by itself only its type is known, which is checked in every call.
+    That is done once for every kind of problem; the type of an array by itself, which has no kind, in every call.
     """
 
     def __init__(self, name: str, signature: tuple[str, ...], sizes: Mapping[str, int]) -> None:
         self.name, self.signature = name, signature
-        self._sizes, self._seen = dict(sizes), set[tuple[Any, ...]]()
-        self._loose = [(i, kind) for i, kind in enumerate(signature) if kind in (FLOATS, INDICES)]
+        self._sizes = dict(sizes)
+        self._slots = [None if argument in BUNDLES else slot_of(argument) for argument in signature]
 
     def _check(self, args: tuple[Any, ...]) -> None:
         if len(args) != len(self.signature):
             raise TypeError(f"kernel {self.name} takes {len(self.signature)} arguments, not {len(args)}")
-        kinds = tuple([a.kind if isinstance(a, Bundle) else type(a) for a in args])
-        for i, (a, kind) in enumerate(zip(args, self.signature, strict=True)):
-            what = f"argument {i} of kernel {self.name}"
-            if kind in BUNDLES:
-                if type(a).__name__ != kind:
-                    raise TypeError(f"{what} must be a {kind}, not {type(a).__name__}")
-            elif kind in (FLOATS, INDICES):
-                if not isinstance(a, np.ndarray):
-                    raise TypeError(f"{what} must be an array, not {type(a).__name__}")
-                check_array(what, kind, a)
-            else:
-                checked(what, Slot(kind, None), a, {})
         known = dict(self._sizes)
-        for found in (a.kind for a in args if isinstance(a, Bundle)):
-            for name, size in found.sizes.items():
+        for i, (a, kind) in enumerate(zip(args, self.signature, strict=True)):
+            if kind not in BUNDLES:
+                continue
+            if type(a).__name__ != kind:
+                raise TypeError(f"{self._argument(i)} must be a {kind}, not {type(a).__name__}")
+            for name, size in a.kind.sizes.items():
                 if known.setdefault(name, size) != size:
-                    where = f"{size} in {found.bundle.__name__}, {known[name]} elsewhere"
-                    raise ValueError(f"kernel {self.name}: {name} is {where}")
-        if len(self._seen) >= MOST_KINDS:
-            self._seen.clear()
-        self._seen.add(kinds)
+                    raise ValueError(f"kernel {self.name}: {name} is {size} in {kind}, {known[name]} elsewhere")
+        for i, (a, slot) in enumerate(zip(args, self._slots, strict=True)):
+            if slot is not None:
+                checked(self._argument(i), slot, a, known)
+
+    def _argument(self, i: int) -> str:
+        """How a message calls an argument: its place, and its sizes where it has some."""
+        _, sized, _ = self.signature[i].partition(": ")
+        return f"argument {i} of kernel {self.name}" + (f" ({self.signature[i]})" if sized else "")
 
 
 class Entry(_Callable):
@@ -80,6 +75,8 @@ class Entry(_Callable):
 
     def __init__(self, name: str, address: int, signature: tuple[str, ...], sizes: Mapping[str, int], keep: Any) -> None:
         super().__init__(name, signature, sizes)
+        self._seen = set[tuple[Any, ...]]()  # what has been checked: kinds of bundles, shapes, whole numbers
+        self._loose = [(i, TYPES[slot.kind]) for i, slot in enumerate(self._slots) if slot and slot.kind in TYPES]
         self._call = ctypes.CFUNCTYPE(None, *(_C_TYPES[k] for k in flat(signature)))(address)
         self._keep = keep  # the code lives as long as something can call it
 
@@ -107,14 +104,21 @@ class Entry(_Callable):
             if isinstance(a, Bundle):
                 out += a.values
                 kinds.append(a.kind)
+            elif isinstance(a, np.ndarray):
+                out.append(address(a))
+                kinds.append(a.shape)
             else:
-                out.append(address(a) if isinstance(a, np.ndarray) else a)
-                kinds.append(type(a))
-        if len(args) != len(self.signature) or tuple(kinds) not in self._seen:
+                out.append(a)
+                kinds.append(a if type(a) is int else type(a))
+        seen = tuple(kinds)
+        if seen not in self._seen:
             self._check(args)
-        for i, kind in self._loose:
-            if args[i].dtype is not TYPES[kind] or not args[i].flags.c_contiguous:
-                check_array(f"argument {i} of kernel {self.name}", kind, args[i])
+            if len(self._seen) >= MOST_KINDS:
+                self._seen.clear()
+            self._seen.add(seen)
+        for i, wanted in self._loose:
+            if args[i].dtype is not wanted or not args[i].flags.c_contiguous:
+                check_array(self._argument(i), wanted, args[i])
         return out
 
 

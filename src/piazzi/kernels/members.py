@@ -16,9 +16,9 @@ BUNDLES: dict[str, type[Bundle]] = {}
 
 
 class Slot(NamedTuple):
-    """A member: what it is; its size along each axis, as a name and what is added to it, None where it is one number.
+    """A member: what it is; its size along each axis, as a name and what is added to it, None of a number or where unknown.
 
-    A whole number may have to be `equal` to a size.
+    A whole number may have to be `equal` to a size.  A number in place of a name is that long.
     """
 
     kind: str
@@ -32,8 +32,7 @@ class Slot(NamedTuple):
         if kind in ("int", "float"):
             return cls({"int": INTEGER, "float": REAL}[kind], None, rest)
         kind, sizes = (INDICES, rest) if kind == "int64" else (FLOATS, text)
-        parts = [size.partition("+") for size in sizes.split()]
-        return cls(kind, tuple((name, int(more or 0)) for name, _, more in parts))
+        return cls(kind, tuple(map(_axis, sizes.split())))
 
 
 class Kind:
@@ -167,24 +166,41 @@ def _remade(kind: type[Bundle], members: dict[str, Any]) -> Bundle:
 
 def checked(what: str, slot: Slot, value: Any, sizes: dict[str, int]) -> None:
     """Raise TypeError or ValueError unless a value fits a slot; `sizes` are known so far, and learn from it."""
-    if slot.shape is None:
+    if slot.kind not in TYPES:
         whole = (int, np.integer)
         if not isinstance(value, whole if slot.kind == INTEGER else (*whole, float, np.floating)):
             raise TypeError(f"{what} must be one {'whole ' if slot.kind == INTEGER else ''}number, not {value!r}")
-        if slot.equal and sizes.setdefault(slot.equal, int(value)) != value:
-            raise ValueError(f"{what} is {value}, but {slot.equal} is {sizes[slot.equal]} elsewhere")
+        if slot.equal:
+            name, more = _axis(slot.equal)
+            _learn(f"{what} is {value}", name, int(value) - more, sizes)
         return
     if not isinstance(value, np.ndarray):
         raise TypeError(f"{what} must be an array, not {type(value).__name__}")
-    check_array(what, slot.kind, value)
+    check_array(what, TYPES[slot.kind], value)
+    if slot.shape is None:
+        return
     if value.ndim != len(slot.shape):
         raise TypeError(f"{what} has shape {value.shape}; it must have {len(slot.shape)} axes")
     for (name, more), size in zip(slot.shape, value.shape, strict=True):
-        if name != "*" and sizes.setdefault(name, size - more) != size - more:
-            raise ValueError(f"{what} has shape {value.shape}, but {name} is {sizes[name]} elsewhere")
+        _learn(f"{what} has shape {value.shape}", name, size - more, sizes)
 
 
-def check_array(what: str, kind: str, value: np.ndarray[Any, Any]) -> None:
+def _axis(text: str) -> tuple[str, int]:
+    """The name of a size, and what is added to it."""
+    name, _, more = text.partition("+")
+    return name, int(more or 0)
+
+
+def _learn(found: str, name: str, size: int, sizes: dict[str, int]) -> None:
+    """Take in the size of an axis; raise ValueError where it was another before."""
+    if name.isdigit():
+        if size != int(name):
+            raise ValueError(f"{found}, with {size} in place of {name}")
+    elif name != "*" and sizes.setdefault(name, size) != size:
+        raise ValueError(f"{found}, but {name} is {sizes[name]} elsewhere")
+
+
+def check_array(what: str, wanted: np.dtype[Any], value: np.ndarray[Any, Any]) -> None:
     """Raise TypeError unless a kernel can take the array."""
-    if value.dtype != TYPES[kind] or not value.flags.c_contiguous:
-        raise TypeError(f"{what} must be contiguous {TYPES[kind]}, not {value.dtype} with strides {value.strides}")
+    if value.dtype != wanted or not value.flags.c_contiguous:
+        raise TypeError(f"{what} must be contiguous {wanted}, not {value.dtype} with strides {value.strides}")

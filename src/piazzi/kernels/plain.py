@@ -36,6 +36,11 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
+def sizes(**_: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Say how long an entry's arrays are, and which of its numbers are sizes, as bundles say it."""
+    return lambda function: function
+
+
 def vector(*entries: Any) -> Array:
     """The vector of these entries."""
     return np.array(entries, dtype=float)

@@ -113,8 +113,7 @@ def _smooth(problem: Moving, nodes: Array, first: Array, steps: Steps, derivativ
     scheme = problem.integrator.arc_scheme
     kind = "rows" if derivative else "state"
     library = kernels.load(_spec(problem, scheme, ("matrices", f"gauss_jackson_{kind}", "gauss_jackson")))
-    Phi = out.Phi if derivative else np.empty(1)
-    library.run_multistep(K, nodes, count, problem.given_bundle, out.x, Phi)
+    library.run_multistep(K, nodes, count, problem.given_bundle, out.x, out.Phi)
     return out
 
 

@@ -4,6 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(clock="4", count="1", Q="N N")
 def live_predict(clock: Array, count: Indices, p: Given, Q: Array, base: Belief, predicted: Belief) -> None:
     x = load_vector(base.mean, 0, N)
     x, Phi, Q_step = advance(clock[0], clock[1], count[0], x, p, load_matrix(Q, 0, N, N), clock[2])
@@ -12,6 +13,7 @@ def live_predict(clock: Array, count: Indices, p: Given, Q: Array, base: Belief,
 
 
 @entry
+@sizes(clock="4", widest="1")
 def live_update(
     clock: Array,
     p: Given,

@@ -4,6 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(widest="1")
 def live_update_guarded(
     run: Run,
     p: Given,

@@ -4,6 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(parts="K")
 def run_forecast(run: Run, parts: Indices, p: Given, last: Belief, beliefs: Beliefs) -> None:
     x = load_vector(last.mean, 0, N)
     P = load_matrix(last.covariance, 0, N, N)

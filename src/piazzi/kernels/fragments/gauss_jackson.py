@@ -22,6 +22,7 @@ def rates_at(F, at):
 
 
 @entry
+@sizes(K="K", t="K", x="K N", Phi="* N N")
 def run_multistep(K: int, t: Array, steps: int, p: Given, x: Array, Phi: Array) -> None:
     F, kept = scratch(HISTORY), scratch(NN)
     begin_derivatives(kept)

@@ -73,6 +73,7 @@ def gooding_solve(p, q, given, back, turns, late, mu):
 
 
 @entry
+@sizes(starts="K 2", given="29", which="3", out="K 4", count="K")
 def gooding(starts: Array, given: Array, which: Array, mu: float, out: Array, count: int) -> None:
     """From each pair of starts (count, 2): the three ranges and the square of the miss, (count, 4)."""
     for k in range(count):

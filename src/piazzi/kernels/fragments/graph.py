@@ -7,6 +7,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(P_last="N N")
 def graph_solve(run: Run, prior: Belief, chain: Chain, P_last: Array, report: Report, damping: float) -> None:
     K = run.epochs
     m, P_first = load_vector(prior.mean, 0, N), load_matrix(prior.covariance, 0, N, N)
@@ -36,6 +37,7 @@ def graph_solve(run: Run, prior: Belief, chain: Chain, P_last: Array, report: Re
 
 
 @entry
+@sizes(P_last="N N")
 def graph_marginals(run: Run, chain: Chain, P_last: Array, smoothed: Smoothed, report: Report) -> None:
     K, covariance = run.epochs, smoothed.covariance
     last = load_matrix(P_last, 0, N, N)

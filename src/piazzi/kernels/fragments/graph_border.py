@@ -4,6 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(start="N", defect="K N")
 def border_solve(run: Run, start: Array, defect: Array, chain: Chain, border: Border, whole: Whole, damping: float) -> None:
     C, size = border.constants, N + border.constants
     begin_border(border)
@@ -44,6 +45,7 @@ def border_solve(run: Run, start: Array, defect: Array, chain: Chain, border: Bo
 
 
 @entry
+@sizes(nu="J M", out="Z K N")
 def border_sensitivities(run: Run, chain: Chain, border: Border, nu: Array, out: Array) -> None:
     """Derivative of every smoothed state by each unknown: the chain solved with that unknown as its only cause."""
     none = unit(-1, N)

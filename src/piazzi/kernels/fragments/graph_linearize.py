@@ -55,6 +55,7 @@ def weigh_dynamics(run, chain, broken, report):
 
 
 @entry
+@sizes(broken="K N")
 def graph_linearize(run: Run, p: Given, measured: Measured, prior: Belief, chain: Chain, broken: Array, report: Report) -> None:
     factor = Factor(scratch(NN), scratch(N))
     report.prior[0] = 0.0
@@ -68,6 +69,7 @@ def graph_linearize(run: Run, p: Given, measured: Measured, prior: Belief, chain
 
 
 @entry
+@sizes(x="K N", d="D N", P="D N N")
 def graph_innovations(
     run: Run, p: Given, measured: Measured, x: Array, d: Array, P: Array, step: int, innovations: Innovations
 ) -> None:

@@ -5,6 +5,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(r="K 3", v="K 3", dt="K", out="K 6", count="K")
 def kepler_arcs(r: Array, v: Array, dt: Array, mu: float, out: Array, count: int) -> None:
     """Position and velocity (count, 6) on two-body motion."""
     for k in range(count):

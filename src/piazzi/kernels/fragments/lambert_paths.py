@@ -108,6 +108,7 @@ def lambert_velocities(from_, to, dt, about, which, mu):
 
 
 @entry
+@sizes(r1="K 3", r2="K 3", dt="K", about="3", which="K 3", out="K 6", count="K")
 def lambert(r1: Array, r2: Array, dt: Array, about: Array, which: Array, mu: float, out: Array, count: int) -> None:
     """Velocities (count, 6); `which` (count, 3) says backwards, turns and late."""
     for k in range(count):
@@ -118,6 +119,7 @@ def lambert(r1: Array, r2: Array, dt: Array, about: Array, which: Array, mu: flo
 
 
 @entry
+@sizes(r1="K 3", r2="K 3", dt="K", about="3", out="K", count="K")
 def lambert_most(r1: Array, r2: Array, dt: Array, about: Array, back: float, mu: float, out: Array, count: int) -> None:
     """How many turns there is time for, (count,)."""
     for k in range(count):

@@ -4,6 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(states="K N")
 def run_measurements(run: Run, p: Given, measured: Measured, states: Array) -> None:
     for k in range(run.epochs):
         x = load_vector(states, k * N, N)

@@ -4,6 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(clock="3", count="1", Q="N N", Phi_out="N N", Q_out="N N")
 def predict_once(clock: Array, count: Indices, p: Given, Q: Array, belief: Belief, Phi_out: Array, Q_out: Array) -> None:
     x, Q_unit = load_vector(belief.mean, 0, N), load_matrix(Q, 0, N, N)
     x, Phi, Q_step = advance(clock[0], clock[1], count[0], x, p, Q_unit, clock[2])

@@ -4,12 +4,14 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(K="K", t="K", x="K N", out="K N")
 def evaluate_dynamics(K: int, t: Array, x: Array, p: Given, out: Array) -> None:
     for k in range(K):
         store(out, k * N, dynamics(t[k], load_vector(x, k * N, N), p))
 
 
 @entry
+@sizes(K="K", t="K", x="K N", out="K N N")
 def evaluate_dynamics_jacobian(K: int, t: Array, x: Array, p: Given, out: Array) -> None:
     for k in range(K):
         _, F = rhs(t[k], load_vector(x, k * N, N), identity_rows(), p)

@@ -22,6 +22,7 @@ def factor_in_place(L):
 
 
 @entry
+@sizes(first="N", w="K N", L="N N", truth="K N")
 def run_simulation(run: Run, p: Given, measured: Measured, first: Array, w: Array, L: Array, truth: Array) -> None:
     x = load_vector(first, 0, N)
     Q = load_matrix(run.Q, 0, N, N)

@@ -4,6 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(finer="K")
 def run_step_error(run: Run, finer: Indices, p: Given, measured: Measured, prior: Belief, beliefs: Beliefs) -> None:
     own = Row(scratch(M), scratch(MN), scratch(WORK))
     x = load_vector(prior.mean, 0, N)

@@ -161,6 +161,7 @@ def fit_step(w, damping):
 
 
 @entry
+@sizes(starts="K 7", rows="J 20", settings="5", work="160", out="K", count="K", many="J")
 def two_body_costs(starts: Array, rows: Array, settings: Array, work: Array, out: Array, count: int, many: int) -> None:
     """Sums of squares (count) of unknowns (count, 7); `settings`: mu, one over the speed of light, sigma of the constant."""
     for k in range(count):
@@ -170,6 +171,7 @@ def two_body_costs(starts: Array, rows: Array, settings: Array, work: Array, out
 
 
 @entry
+@sizes(starts="K 7", rows="J 20", settings="5", work="160", out="K 65", count="K", many="J")
 def two_body_fits(starts: Array, rows: Array, settings: Array, work: Array, out: Array, count: int, many: int) -> None:
     """From each start: unknowns (7), the sum of squares, steps taken, and the triangle (7, 8) there: (count, 65).
 

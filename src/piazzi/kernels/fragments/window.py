@@ -4,6 +4,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(begin="K")
 def run_window(
     begin: Indices,
     window: Window,

@@ -7,6 +7,7 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @entry
+@sizes(span="2")
 def live_append(span: Indices, run: Run, p: Given, chain: Chain) -> None:
     k = span[1]
     x = load_vector(chain.x, (k - 1) * N, N)
@@ -14,12 +15,14 @@ def live_append(span: Indices, run: Run, p: Given, chain: Chain) -> None:
 
 
 @entry
+@sizes(span="2")
 def live_marginalize(span: Indices, window: Window, run: Run, p: Given, chain: Chain) -> None:
     for a in range(span[0], span[1]):
         marginalize_oldest(a, span[0], window, run, p, chain)
 
 
 @entry
+@sizes(span="2", widest="1")
 def live_solve(
     span: Indices,
     window: Window,
