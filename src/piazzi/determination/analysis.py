@@ -66,7 +66,7 @@ def analysed(given: Setup, states: Array) -> Analysis:
     full = problem.station_correlated[stations].astype(np.bool_)[:, None]
     # along an angle on the sky, as kernels have it; of components with a full covariance whitened ones are mixed
     residual = np.where(full, wrapped(problem, stations, inputs.z - computed), shot.innovations * sigma)
-    constants = len(problem.model.states)
+    constants = 6  # and processes, of which as much is known
     spread = np.sqrt(np.diag(problem.covariance))[constants:]
     known = np.flatnonzero(spread > 0)
     prior = np.zeros((len(known), problem.model.n))

@@ -27,7 +27,6 @@ def document(found: Any) -> dict[str, Any]:
         "object": found.object,
         "epoch": found.epoch.to(found.scale),
         "frame": found.frame,
-        "about": found.setup.measured.about,
         "names": list(model.names),
         "units": [model.unit(name) for name in model.names],
         "mean": _listed(mean),
@@ -41,7 +40,7 @@ def document(found: Any) -> dict[str, Any]:
         "seconds": float(found.seconds),
         "estimated": estimated(found),
         "considered": considered(found),
-        "manoeuvres": [],
+        "manoeuvres": manoeuvres(found),
         "span": span(found),
         "residuals": groups(found),
         "rejected": rejected(found),
@@ -68,14 +67,15 @@ def solution(found: Any) -> tuple[Array, Array]:
 
 def estimated(found: Any) -> list[dict[str, Any]]:
     """Constants that were estimated, with what was known of them before."""
-    problem, k = found.problem, found.setup.solution
+    problem, k, labels = found.problem, found.setup.solution, found.setup.labels
     mean, covariance = found.estimate.mean[k], found.estimate.covariance[k]
     out = []
     for i, name in enumerate(problem.model.constants, start=len(problem.model.moving)):
         given = problem.parameters[name]
         out.append({
-            "name": name, "unit": problem.model.unit(name), "prior": float(given.mean[0]),
-            "prior_sigma": float(np.sqrt(given.covariance[0, 0])), "value": finite(float(mean[i])),
+            "name": labels[name].name if name in labels else name, "unit": problem.model.unit(name),
+            "prior": float(given.mean[0]), "prior_sigma": float(np.sqrt(given.covariance[0, 0])),
+            "value": finite(float(mean[i])),
             "sigma": finite(float(np.sqrt(covariance[i, i]))) if covariance[i, i] >= 0 else None,
         })  # fmt: skip
     return out
@@ -83,12 +83,50 @@ def estimated(found: Any) -> list[dict[str, Any]]:
 
 def considered(found: Any) -> list[dict[str, Any]]:
     """Constants whose uncertainty counts and that were not estimated."""
-    units = {p.name: p.unit for p in found.problem.model.parameters}
+    units, labels = {p.name: p.unit for p in found.problem.model.parameters}, found.setup.labels
     given: dict[str, Gaussian] = {name: found.problem.parameters[name] for name in found.problem.considered}
     return [
-        {"name": name, "unit": units[name], "value": float(g.mean[0]), "sigma": float(np.sqrt(g.covariance[0, 0]))}
+        {
+            "name": labels[name].name if name in labels else name,
+            "unit": units[name],
+            "value": float(g.mean[0]),
+            "sigma": float(np.sqrt(g.covariance[0, 0])),
+        }
         for name, g in given.items()
     ]
+
+
+def manoeuvres(found: Any) -> list[dict[str, Any]]:
+    """Manoeuvres: what was commanded and what came out, m/s along their axes."""
+    problem, k = found.problem, found.setup.solution
+    names, mean, P = problem.model.names, found.estimate.mean[k], found.estimate.covariance[k]
+
+    def value(name: str) -> float:
+        return float(mean[names.index(name)]) if name in names else _number(problem.parameters[name])
+
+    out = []
+    for push in found.setup.chosen.extra.pushes:
+        burn, turned = push.burn, push.turned
+        J = np.zeros((3, len(names)))
+        size = value(push.scale) if push.scale else 1.0
+        given = np.array([value(name) for name in push.dv])
+        for i, name in enumerate(push.dv):
+            if name in names:
+                J[i, names.index(name)] = size
+        if push.scale in names:
+            J[:, names.index(push.scale)] = given
+        sigma = np.sqrt(np.maximum(np.diag(turned.T @ J @ P @ J.T @ turned), 0.0))
+        prior = np.sqrt(np.array(burn.sigma) ** 2 + (burn.scale * np.array(burn.dv)) ** 2)
+        out.append({
+            "time": burn.epoch.to(found.scale), "duration": burn.duration, "axes": burn.axes, "engine": burn.engine or None,
+            "dv": list(burn.dv), "prior_sigma": prior.tolist(), "estimate": _listed(size * (turned.T @ given)),
+            "sigma": _listed(sigma), "scale": finite(size) if push.scale else None,
+        })  # fmt: skip
+    return out
+
+
+def _number(given: Any) -> float:
+    return float(np.ravel(given.mean)[0]) if isinstance(given, Gaussian) else float(given)
 
 
 def span(found: Any) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from piazzi.determination.motion import Extra
 from piazzi.earth import ForceChoice, Forces, LaserSphere, laser_sphere, read_forces
 from piazzi.earth.defaults import AIR_BELOW, lowest_height
 from piazzi.earth.force_options import CONSTANT
@@ -23,7 +24,8 @@ COEFFICIENTS = {"cr": "cr_a_m", "cd": "cd_a_m"}
 class Chosen:
     """Forces with the roles and values of their parameters.
 
-    `facts` is what a result tells of them, `left_out` what is not modelled, `assumed` where numbers came from.
+    `facts` is what a result tells of them, `left_out` what is not modelled, `assumed` where numbers came from, `extra` what
+    is added to them.
     """
 
     choice: ForceChoice
@@ -33,6 +35,7 @@ class Chosen:
     max_step: float
     left_out: Mapping[str, str] = field(default_factory=dict)
     assumed: tuple[str, ...] = ()
+    extra: Extra = field(default_factory=Extra)
 
     @property
     def forces(self) -> Forces:

@@ -53,7 +53,7 @@ def _part(context: Context, rows: Array) -> Part:
     segment = observations.segments[observations.segment[first]]
     site = context.site(int(observations.station[first]))
     way = way_of(context, segment, int(observations.tag[first]))
-    sensor = _sensor(way)
+    sensor = _sensor(way, context.clocks)
     numbers: dict[str, Any] = {"centre_of_mass": _centre(context, segment)}
     weather = None
     if way.troposphere is not None:
@@ -75,10 +75,10 @@ def _part(context: Context, rows: Array) -> Part:
 
 
 @lru_cache(maxsize=64)
-def _sensor(way: Way) -> Any:
+def _sensor(way: Way, clocks: bool) -> Any:
     """The sensor, by a name that says what it is of."""
     name = "_".join(["range", *way.path.split("-"), way.tag, *(way.troposphere.split("-") if way.troposphere else [])])
-    return sensors.range(way.path, name=name, tag=way.tag, relativity=True, troposphere=way.troposphere)
+    return sensors.range(way.path, name=name, tag=way.tag, relativity=True, troposphere=way.troposphere, time_bias=clocks)
 
 
 def way_of(context: Context, segment: Segment, tag_index: int) -> Way:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis
 from piazzi.determination.beliefs import beliefs
-from piazzi.determination.case import Case
 from piazzi.determination.orbit import Orbit
 from piazzi.determination.setup import Setup, carried
 from piazzi.determination.verdict import DECISIVE, Sentence
@@ -41,7 +40,6 @@ class Determination:
     frame : axes of the answer
     seconds : of all estimators together
     notes : further facts, as a result tells them: options, files
-    case : what was asked for, products among it
     """
 
     setup: Setup
@@ -55,7 +53,6 @@ class Determination:
     frame: str
     seconds: float
     notes: Mapping[str, Any]
-    case: Case = field(default_factory=Case)
 
     @property
     def estimate(self) -> Estimate:
@@ -105,7 +102,7 @@ class Determination:
         def at(epochs: Sequence[Epoch]) -> tuple[Array, Array]:
             return beliefs(self.setup, self.estimate, epochs)
 
-        return Orbit(self.epoch, self.frame, at, self.setup.measured.centre)
+        return Orbit(self.epoch, self.frame, at)
 
     @property
     def modes(self) -> tuple[dict[str, Any], ...]:
@@ -144,10 +141,7 @@ class Determination:
         return document(self)
 
     def write(self, path: Any, **options: Any) -> None:
-        """Write a product by the suffix of its name, whole or not at all: .oem .opm .ocm .tle .nc .csv .json .toml.
-
-        Options are ``span``, ``step`` and ``formal``, whether covariances are written as computed; default those of `case`.
-        """
+        """Write a product by the suffix of its name, whole or not at all: .oem .opm .ocm .tle .nc .csv .json .toml."""
         from piazzi.determination.products import write
 
         write(self, path, **options)
@@ -160,7 +154,7 @@ class Determination:
 
     def ephemeris(self, span: Any = None, step: float | None = None, frame: str | None = None) -> Any:
         """States and covariances over a span, an `Ephemeris`; default the rows that were used, to the solution."""
-        from piazzi.determination.arcs import ephemeris
+        from piazzi.determination.products import ephemeris
 
         return ephemeris(self, span, step, frame)
 

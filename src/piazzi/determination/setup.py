@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
@@ -11,13 +10,16 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.guesses import Guess
+from piazzi.determination.motion import Extra, process_noise, with_processes
 from piazzi.determination.orbit_forces import Chosen
 from piazzi.determination.sensing import Measured
-from piazzi.earth import EphemerisWarning, Epoch
+from piazzi.determination.unknowns import Label
+from piazzi.earth import Epoch
 from piazzi.kernels import RungeKutta8
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.arcs import Steps, arc
 from piazzi.problem.checks import Array
+from piazzi.problem.manoeuvres import SAME
 
 WIDE = 0.1  # of distance and speed: the sigma of a guess, which says where to begin and nothing else
 
@@ -43,6 +45,11 @@ class Setup:
     states: Array
     solution: int
     assumed: tuple[str, ...]
+
+    @property
+    def labels(self) -> Mapping[str, Label]:
+        """How users know what has names for kernels only."""
+        return {**self.measured.labels_of_constants, **self.chosen.extra.labels}
 
 
 def setup(
@@ -73,7 +80,9 @@ def setup(
     begun = guess.epoch - measured.epoch
     states = _followed(problem, begun, times, chosen.max_step)
     mean = states[0, : len(problem.model.states)]
-    problem = replace(problem, prior=_prior(mean), prior_time=float(times[0]))
+    begin = float(times[0])
+    later = [m for m in problem.manoeuvres if m.time > begin + SAME * max(abs(begin), 1.0)]
+    problem = replace(problem, prior=_prior(mean, chosen.extra), prior_time=begin, manoeuvres=later)
     assumed = tuple(dict.fromkeys([*guess.assumed, *measured.assumed, *chosen.assumed]))
     return Setup(measured, chosen, guess, problem, tracking, rows, states, solution, assumed)
 
@@ -96,25 +105,26 @@ def posed(
     own = {name: role for name, (role, _) in measured.parameters.items()}
     every = {**chosen.roles, **own, **(roles or {})}
     numbers = {**chosen.values, **{name: value for name, (_, value) in measured.parameters.items()}, **(values or {})}
-    model = chosen.forces.model(measured.sensors, every, functions=measured.functions)
     air = chosen.choice.air(measured.epoch, guess.state[:6], guess.epoch - measured.epoch)
+    extra = chosen.extra
+    every |= {p.state: "fixed" for p in extra.processes}  # until they are states
+    functions = {**measured.functions, **extra.functions}
+    model = with_processes(
+        chosen.forces.model(measured.sensors, every, extra.added, extra.definitions, functions), extra.processes
+    )
+    mean = np.concatenate([guess.state, np.zeros(len(extra.processes))])
     return Problem(
         model,
-        _prior(guess.state),
+        _prior(mean, extra),
+        process_noise(extra.processes, len(mean)),
         stations=measured.stations,
-        parameters=numbers,
+        parameters={**numbers, **{p.parameter: p.time for p in extra.processes}},
+        manoeuvres=extra.manoeuvres,
         integrator=RungeKutta8(max_step=chosen.max_step),
-        functions={**_data(chosen, measured.epoch, air), **measured.functions},
+        functions={**chosen.choice.functions(measured.epoch, air), **functions},
         epoch=measured.epoch,
         name=measured.object,
     )
-
-
-def _data(chosen: Chosen, epoch: Epoch, air: Any) -> Mapping[str, Any]:
-    """Data of the forces; where planets are by series a result says so, once."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", EphemerisWarning)
-        return chosen.choice.functions(epoch, air)
 
 
 def scale_of(given: Setup, first: Array) -> Array:
@@ -124,9 +134,9 @@ def scale_of(given: Setup, first: Array) -> Array:
     return np.where(sigma > 0, sigma, 1.0)
 
 
-def _prior(mean: Array) -> Gaussian:
+def _prior(mean: Array, extra: Extra) -> Gaussian:
     distance, speed = np.linalg.norm(mean[:3]), np.linalg.norm(mean[3:6])
-    sigma = np.concatenate([np.full(3, WIDE * distance), np.full(3, WIDE * speed), np.zeros(len(mean) - 6)])
+    sigma = np.concatenate([np.full(3, WIDE * distance), np.full(3, WIDE * speed), [p.sigma for p in extra.processes]])
     return Gaussian(mean, np.diag(sigma**2))
 
 
@@ -176,9 +186,26 @@ def follow(problem: Problem, times: Array, first: Array, step: float) -> tuple[A
     if len(times) == 1:
         return first[None, :].copy(), np.empty((0, len(first), len(first)))
     problem.cover(float(min(times[0], times[-1])), float(max(times[0], times[-1])))
+    if times[-1] < times[0] and problem.manoeuvres:
+        return _backwards(problem, times, first, step)
     with np.errstate(all="ignore"):
         found = arc(problem, np.ascontiguousarray(times), np.asarray(first), Steps(step), derivative=True)
     lost = np.flatnonzero(~np.isfinite(found.x).all(axis=1))
     if len(lost):
         raise ValueError(f"the guess cannot be followed beyond {problem.epoch + float(times[lost[0]])}: it leaves every orbit")
     return found.x, found.Phi
+
+
+def _backwards(problem: Problem, times: Array, first: Array, step: float) -> tuple[Array, Array]:
+    """The same where times decrease: kernels end steps at manoeuvres on the way forwards only, so that these are nodes."""
+    edges = np.array([m.time for m in problem.manoeuvres])
+    nodes = np.unique(np.concatenate([times, edges[(edges < times[0]) & (edges > times[-1])]]))[::-1]
+    states, Phi = follow(replace(problem, manoeuvres=()), nodes, first, step)
+    where = np.searchsorted(-nodes, -times)
+    total = np.empty((len(times) - 1, *Phi.shape[1:]))
+    for k, (i, j) in enumerate(zip(where[:-1].tolist(), where[1:].tolist(), strict=True)):
+        now = np.eye(len(first))
+        for one in Phi[i:j]:
+            now = one @ now
+        total[k] = now
+    return states[where], total

@@ -116,11 +116,7 @@ def remarks(facts: dict[str, Any]) -> Iterator[str]:
     """Forces, constants, what was left out and what was assumed."""
     forces = facts["forces"]
     extra = [k for k in ("relativity", "radiation", "drag") if forces[k]]
-    field = (
-        f"{forces['gravity']} to degree {forces['degree']}"
-        if forces["degree"]
-        else f"the {facts.get('about', 'earth').title()} as a point"
-    )
+    field = f"{forces['gravity']} to degree {forces['degree']}" if forces["degree"] else "the Earth as a point"
     names = [field, *forces["bodies"], *(f"{t} tides" for t in forces["tides"]), *extra, *forces["empirical"]]
     yield f"Forces ({forces['source']}): {', '.join(names)}."
     if "against" in facts:
@@ -146,21 +142,21 @@ def line(found: Any) -> str:
 def shown(given: Setup) -> str:
     """Forces, unknowns, noise and assumptions of a problem that is not solved yet."""
     problem, chosen, measured = given.problem, given.chosen, given.measured
-    facts = {
-        "about": measured.about,
-        "forces": chosen.facts,
-        "left_out": {**chosen.left_out, **measured.left_out},
-        "assumed": given.assumed,
-    }
+    facts = {"forces": chosen.facts, "left_out": {**chosen.left_out, **measured.left_out}, "assumed": given.assumed}
     lines = [f"{measured.object or 'the object'}: {len(given.tracking.times):,} epochs from {measured.first}"]
     lines += [
         f"Begins at {given.guess.epoch} from {given.guess.source}: {', '.join(f'{v:.6g}' for v in given.guess.state)} (m, m/s)."
     ]
     lines += ["Unknowns:", "  position and velocity, which the guess leaves open"]
     for name in problem.model.constants:
-        prior = problem.parameters[name]
-        lines.append(f"  {name}: {prior.mean[0]:.4g} +- {prior.covariance[0, 0] ** 0.5:.3g} {problem.model.unit(name)}")
-    lines += [f"Considered: {name}" for name in problem.considered]
+        lines.append(f"  {_unknown(given, name)}")
+    for one in chosen.extra.processes:
+        lines.append(f"  {one.label.name}, {one.label.words}: 0 +- {one.sigma:.3g} {one.unit}".rstrip())
+    lines += [f"Considered: {_unknown(given, name)}" for name in problem.considered]
+    for push in chosen.extra.pushes:
+        dv = ", ".join(f"{v:g}" for v in push.burn.dv)
+        how = f"over {push.burn.duration:g} s" if push.burn.duration else "at once"
+        lines.append(f"Manoeuvre at {push.burn.epoch}: {dv} m/s along {push.burn.axes}, {how}")
     lines.append("Noise:")
     for station in problem.stations:
         sensor = problem.model.sensor(station.sensor)
@@ -170,3 +166,10 @@ def shown(given: Setup) -> str:
         )
         lines.append(f"  {measured.labels[station.name]} ({station.sensor}): {sigmas}")
     return "\n".join(printable(text) for text in [*lines, *remarks(facts)])
+
+
+def _unknown(given: Setup, name: str) -> str:
+    """A constant in words, with what is known of it before the measurements."""
+    prior, label = given.problem.parameters[name], given.labels.get(name)
+    words = name if label is None else f"{label.name}, {label.words}"
+    return f"{words}: {prior.mean[0]:.4g} +- {prior.covariance[0, 0] ** 0.5:.3g} {given.problem.model.unit(name)}".rstrip()

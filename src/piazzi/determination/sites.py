@@ -30,7 +30,7 @@ class Context:
     com : centre of mass, m, where the user says it
     corrected : whether the user says that measurements are corrected for media already
     open : whether the user says that they are not
-    about : what the orbit goes about
+    clocks : whether sensors have a number that times are late by
     """
 
     observations: Observations
@@ -40,7 +40,7 @@ class Context:
     com: float | None = None
     corrected: bool = False
     open: bool = False
-    about: str = "earth"
+    clocks: bool = False
     said: dict[str, None] = field(default_factory=dict)
 
     def site(self, index: int) -> Station:

@@ -198,6 +198,7 @@ class Forces:
         every: dict[str, Any] = dict.fromkeys(self.parameters, "fixed")
         for given in (*(getattr(s, "parameters", {}) for s in seen), roles):
             every |= given
+        units = {name: unit for s in seen for name, unit in s.number_units}
         dynamics = dict(self.dynamics)
         for state, text in (added or {}).items():
             if state not in dynamics:
@@ -209,7 +210,7 @@ class Forces:
             STATES,
             dynamics,
             sensors,
-            [Parameter(name, role, unit_of(name)) for name, role in every.items()],
+            [Parameter(name, role, units.get(name) or unit_of(name)) for name, role in every.items()],
             _GROUPS,
             _UNITS,
             definitions={**used_definitions(self.definitions, texts), **(definitions or {})},

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from piazzi.model import Model, Parameter, Sensor
-from piazzi.model.definitions import Definition
+from piazzi.model.renaming import renamed, with_names
 from piazzi.problem.parts import Gaussian, Station
 from piazzi.text import nearest
 
@@ -75,20 +75,9 @@ def _extended(model: Model, sensor: Sensor, station: Station, names: Mapping[str
     constants = tuple(Parameter(new, roles[old], units.get(old, "")) for old, new in names.items())  # type: ignore[arg-type]
     base, taken = f"{sensor.name}-{_plain(station.name)}", {s.name for s in model.sensors}
     label = next(n for n in (base, *(f"{base}-{i}" for i in range(2, len(taken) + 3))) if n not in taken)
-    equations = {c: _renamed(e, names) for c, e in zip(sensor.components, sensor.equations, strict=True)}
+    equations = {c: renamed(e, names) for c, e in zip(sensor.components, sensor.equations, strict=True)}
     left = {name: unit for name, unit in units.items() if name not in names}
-    definitions = tuple(_with_names(d, names) for d in sensor.definitions)
-    visible = [_renamed(rule, names) for rule in sensor.visible]
+    definitions = tuple(with_names(d, names) for d in sensor.definitions)
+    visible = [renamed(rule, names) for rule in sensor.visible]
     copy = Sensor(label, equations, sensor.angles, dict(sensor.units), left, definitions, visible, (), sensor.on_sky)
     return replace(model, parameters=(*model.parameters, *constants), sensors=(*model.sensors, copy))
-
-
-def _with_names(d: Definition, names: Mapping[str, str]) -> Definition:
-    """The definition with other names for some that its texts use."""
-    inner = tuple(_with_names(own, names) for own in d.inner)
-    return replace(d, texts=tuple(_renamed(text, names) for text in d.texts), inner=inner)
-
-
-def _renamed(equation: str, names: Mapping[str, str]) -> str:
-    """The equation with other names for some of its own; an equation holds nothing but names, numbers and signs."""
-    return re.sub(r"(?<![\w.])[A-Za-z]\w*", lambda found: names.get(found[0], found[0]), equation)

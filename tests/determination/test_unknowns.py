@@ -1,0 +1,182 @@
+"""The words of --estimate, --consider and --manoeuvre, and what becomes of them."""
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi.determination.burns import Burn, burns_of
+from piazzi.determination.ramps import RAMP, pieces, profiles
+from piazzi.determination.unknowns import asked, considered, listed
+from piazzi.outside.function import Function
+
+WHEN = "2026-11-03T04:12:00Z"
+
+
+def test_a_list_of_unknowns_is_read_word_by_word():
+    found = listed(f"cd/12h cr bias.range.7090/pass=1m clock.BER=1ms dv@{WHEN} cd~2h=30%")
+    assert [(one.name, one.per, one.sigma, one.kind) for one in found] == [
+        ("cd", "12h", None, ""), ("cr", None, None, ""), ("bias.range.7090", "pass", "1m", "bias"),
+        ("clock.BER", None, "1ms", "clock"), (f"dv@{WHEN}", None, None, "dv"), ("cd", "~2h", "30%", ""),
+    ]  # fmt: skip
+    assert [found[0].period, found[2].size("m", 0.0), found[3].size("s", 0.0), found[5].period, found[5].size("", 0.0)] == [
+        43200.0, 1.0, 1e-3, 7200.0, 0.3,
+    ]  # fmt: skip
+    assert found[4].epoch == pz.Epoch(WHEN)
+    assert listed([pz.Estimated("cd", per="12h", sigma=0.5), "cr"])[0].size("", 9.0) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("cd/12", "cd/12 is '12'; write a length of time such as 60s, 6h or 3d"),
+        ("cd//12h", "'cd//12h' cannot be read: write such as cd/12h cr"),
+        ("5 cd", "'5' cannot be read"),
+        ("bias.range=", "'bias.range=' cannot be read"),
+        ("dv@2026-11-03T04:12:00", "no time scale"),
+        ("cr cr=0.5", "cr is given twice"),
+        ("cd=-1", "a sigma is positive, not -1"),
+        ("cd=0.0", "a sigma is positive, not 0.0"),
+    ],
+)
+def test_words_that_cannot_be_are_refused(words, says):
+    with pytest.raises(ValueError, match=says.replace("(", r"\(")):
+        asked(words, ())
+
+
+def test_units_are_those_of_the_kind():
+    (one,) = listed("clock.BER=1m")
+    with pytest.raises(ValueError, match="unit such as s"):
+        one.size("s", 0.0)
+    (plain,) = listed("bias.range=1")
+    with pytest.raises(ValueError, match="without a unit"):
+        plain.size("m", 0.0)
+
+
+def test_what_is_considered_has_a_sigma():
+    assert [(one.name, one.sigma) for one in considered(["cr=0.1 bias.range=5cm"])] == [("cr", "0.1"), ("bias.range", "5cm")]
+    assert considered({"cr": 0.1})[0].sigma == 0.1
+    for words, says in (("cr", "has no sigma"), ("cd/12h=0.1", "one value, or one per pass")):
+        with pytest.raises(ValueError, match=says):
+            considered(words)
+
+
+def test_a_manoeuvre_in_words():
+    (arc,) = burns_of(f"{WHEN} dv=0,0.3,0m/s axes=RTN sigma=0.05m/s for=600s")
+    assert arc == Burn(pz.Epoch(WHEN), (0.0, 0.3, 0.0), "RTN", (0.05, 0.05, 0.05), 0.0, 600.0)
+    (scaled,) = burns_of(f"{WHEN} dv=0,30,0cm/s for=10min sigma=5% engine=A")
+    assert (scaled.scale, scaled.engine, scaled.sigma, scaled.duration) == (0.05, "A", (0.0, 0.0, 0.0), 600.0)
+    assert scaled.dv == pytest.approx((0.0, 0.3, 0.0))
+    (usual,) = burns_of(f"{WHEN} dv=0,0,2m/s axes=TNW")
+    assert usual.assumed and usual.sigma == pytest.approx((0.2, 0.2, 0.2))
+    (thrust,) = burns_of(f"{WHEN} dv=0,0,2m/s axes=EME2000 for=60s")
+    assert thrust.assumed and thrust.scale == 0.1 and thrust.axes == "EME2000"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (f"{WHEN[:-1]} dv=0,0.3,0m/s", "no time scale"),
+        (f"{WHEN} dv=0,0.3m/s", "write three numbers and their unit"),
+        (f"{WHEN} dv=0,0.3,0", "without a unit"),
+        (f"{WHEN} dv=0,0.3,0m/s axis=RTN", "unknown name 'axis'; did you mean 'axes'"),
+        (f"{WHEN} dv=0,0.3,0m/s axes=RTM", "axes 'RTM' are not known; did you mean 'RTN'"),
+        (f"{WHEN} dv=0,0.3,0m/s axes=ITRF", "turn with the Earth"),
+        (f"{WHEN} for=600s dv=0,0.3,0m/s sigma=-1m/s", "must not be negative"),
+        (f"{WHEN} axes=RTN", "it has no dv"),
+        (f"{WHEN} dv=0,1,0m/s RTN", "'RTN' stands alone"),
+        (f"{WHEN} dv=0,1,0m/s engine=A sigma=1m/s", "have one scale"),
+    ],
+)
+def test_manoeuvres_that_cannot_be_are_refused(words, says):
+    with pytest.raises(ValueError, match=says):
+        burns_of(words)
+
+
+def test_manoeuvres_of_a_table(tmp_path):
+    file = tmp_path / "burns.csv"
+    rows = ["time, dv_1, dv_2, dv_3, axes, sigma, for", "2026-11-04T00:00:00Z, 0m/s, 1m/s, 0m/s, TNW, 5%, 30s"]
+    file.write_text("\n".join([*rows, f"{WHEN}, 0m/s, 0m/s, 2m/s,,,"]))
+    first, second = burns_of(str(file))
+    assert (first.dv, first.axes, first.duration) == ((0.0, 0.0, 2.0), "RTN", 0.0)
+    assert (second.dv, second.axes, second.scale, second.duration) == ((0.0, 1.0, 0.0), "TNW", 0.05, 30.0)
+    file.write_text("time, dw\n")
+    with pytest.raises(ValueError, match="line 1: unknown column 'dw'; known: time, dv, axes"):
+        burns_of(str(file))
+    file.write_text(f"time, dv\n{WHEN}, 3\n")
+    with pytest.raises(ValueError, match="line 2: dv is '3'"):
+        burns_of(str(file))
+
+
+OPM = f"""CCSDS_OPM_VERS = 2.0
+CREATION_DATE = 2026-01-01T00:00:00
+ORIGINATOR = X
+OBJECT_NAME = A
+OBJECT_ID = 2020-001A
+CENTER_NAME = EARTH
+REF_FRAME = GCRF
+TIME_SYSTEM = UTC
+EPOCH = 2026-11-03T00:00:00
+X = 7000
+Y = 0
+Z = 0
+X_DOT = 0
+Y_DOT = 7.5
+Z_DOT = 0
+MASS = 100
+MAN_EPOCH_IGNITION = {WHEN[:-1]}
+MAN_DURATION = 60
+MAN_DELTA_MASS = -1
+MAN_REF_FRAME = RTN
+MAN_DV_1 = 0
+MAN_DV_2 = 0.001
+MAN_DV_3 = 0
+"""
+OCM = f"""CCSDS_OCM_VERS = 3.0
+CREATION_DATE = 2026-01-01T00:00:00
+ORIGINATOR = X
+META_START
+TIME_SYSTEM = UTC
+EPOCH_TZERO = 2026-11-03T00:00:00
+META_STOP
+MAN_START
+MAN_ID = 1
+MAN_REF_FRAME = TNW_INERTIAL
+MAN_COMPOSITION = TIME_ABSOLUTE, MAN_DURA, DV_X, DV_Y, DV_Z
+MAN_UNITS = [n/a, s, m/s, m/s, m/s]
+{WHEN[:-1]} 60 1.0 0 0
+MAN_STOP
+MAN_START
+MAN_ID = 2
+MAN_REF_FRAME = RTN
+MAN_COMPOSITION = TIME_RELATIVE, DV_X, DV_Y, DV_Z
+15120 0 0.001 0
+MAN_STOP
+"""
+
+
+def test_manoeuvres_of_messages(tmp_path):
+    file = tmp_path / "burns.opm"
+    file.write_text(OPM)
+    (burn,) = burns_of(file)
+    assert burn == Burn(pz.Epoch(WHEN), (0.0, 1.0, 0.0), "RTN", (0.0, 0.0, 0.0), 0.1, 60.0, "", True)
+    file.write_text(OCM)
+    first, second = burns_of(file)
+    assert (first.epoch, first.dv, first.axes, first.duration) == (pz.Epoch(WHEN), (1.0, 0.0, 0.0), "TNW", 60.0)
+    assert abs(second.epoch - pz.Epoch(WHEN)) < 1e-9
+    assert (second.dv, second.axes, second.duration) == ((0.0, 1.0, 0.0), "RTN", 0.0)
+
+
+def test_values_for_parts_of_the_time_change_over_a_ramp():
+    of = Function(pieces(3), 4, 1, [(0, k) for k in (1, 2, 3)], [10.0, 20.0])
+    for t, wanted in ((0.0, 5.0), (10.0 - RAMP, 5.0), (10.0, 6.0), (10.0 + RAMP, 7.0), (20.0 + RAMP, -1.0), (1e6, -1.0)):
+        assert of.value(t, 5.0, 7.0, -1.0)[0] == pytest.approx(wanted)
+        share = of.derivatives(t, 5.0, 7.0, -1.0)[0, 1:]
+        assert share.sum() == pytest.approx(1.0) and share @ [5.0, 7.0, -1.0] == pytest.approx(wanted)
+
+
+def test_a_profile_has_the_area_one():
+    of = Function(profiles(2), 1, 2, [], [10.0, 12.0, 50.0, 51.0])
+    t = np.linspace(0.0, 60.0, 600001)
+    values = np.array([of.value(x) for x in t[95000:125000:10]])[:, 0]
+    assert np.trapezoid(values, t[95000:125000:10]) == pytest.approx(1.0, abs=1e-3)
+    assert of.value(11.0) == (0.5, 0.0) and of.value(50.5) == (0.0, 1.0)
