@@ -83,3 +83,10 @@ def mixed(colour: str, towards: int, share: float) -> str:
 def label_of(name: str, view: str) -> str:
     """Name for legends; a window says which of its two views is meant."""
     return f"{name}, {'delayed' if view == 'delayed' else 'real time'}" if name.partition(":")[0] == "window" else name
+
+
+def station_colour(index: int) -> str:
+    """Colour of a station by its place in a list: six that differ, then darker and paler ones."""
+    colour = STATIONS[index % len(STATIONS)]
+    turn = index // len(STATIONS) % 3
+    return colour if not turn else mixed(colour, 0 if turn == 1 else 255, 0.4)

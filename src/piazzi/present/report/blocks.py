@@ -50,7 +50,7 @@ class Axis:
 class Line:
     """Values against x: a line, points, thick spans, or a band of +-y about zero.
 
-    `key` is the index of its legend entry, -1 for none.
+    `key` is the index of its legend entry, -1 for none.  `notes` are words on each value, "" for none, shown under the pointer.
 
     Where `y` is a tuple of arrays, the root of their summed squares is meant.  What is drawn is `times` as large.
     """
@@ -59,10 +59,11 @@ class Line:
     y: Array | tuple[Array, ...]
     label: str
     key: int = -1
-    kind: Literal["line", "points", "band", "bars", "spans"] = "line"
+    kind: Literal["line", "points", "crosses", "band", "bars", "spans"] = "line"
     times: float = 1.0
     colour: str = "#7A7A7A"
     dash: tuple[int, ...] = ()
+    notes: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,7 @@ class Chart:
     single : whether it shows only the estimator that is looked at closely
     levels : horizontal lines with a label
     ranges : horizontal bands, low to high, with a label
+    shades : stretches of x, (S, 2), that are shaded
     column : heading under which the values at the cursor are listed, "" for none
     """
 
@@ -88,6 +90,7 @@ class Chart:
     ranges: Sequence[tuple[float, float, str]] = ()
     note: str = ""
     column: str = ""
+    shades: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,12 +122,17 @@ class Orbit:
 
 @dataclass(frozen=True)
 class Table:
-    """Headings with units, and rows of text; `keys` colours the rows by their legend entry."""
+    """Headings with units, and rows of text; `keys` colours the rows by their legend entry, `words` are columns of sentences.
+
+    One that is `half` takes half of the width.
+    """
 
     heads: Sequence[tuple[str, str]]
     rows: Sequence[Sequence[str]]
     caption: str = ""
     keys: Sequence[int] = ()
+    words: Sequence[int] = ()
+    half: bool = False
 
 
 @dataclass(frozen=True)
@@ -141,21 +149,100 @@ class Text:
     paragraphs: Sequence[str]
 
 
-Block = Chart | Orbit | Table | CursorValues | Text
+@dataclass(frozen=True)
+class Code:
+    """What is typed, letter by letter."""
+
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Measurements of one station along an orbit, NaN between passes.
+
+    Attributes
+    ----------
+    label, colour : of the station
+    times : (R,), s
+    place : (R, 3), of the object when it was measured, fixed to the Earth, m
+    turned : (R,), angle of the Earth then, rad
+    used : (R,), 1 or 0
+    notes : words on each row, "" for none
+    site : (3,), of the station, fixed to the Earth, m; None where it stands nowhere
+    azimuth, elevation : (R,), of the object seen from there, rad
+    """
+
+    label: str
+    colour: str
+    times: Array
+    place: Array
+    turned: Array
+    used: Array
+    notes: Sequence[str] = ()
+    site: Array | None = None
+    azimuth: Array | None = None
+    elevation: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """An orbit about the Earth, on a globe that turns or on a map.
+
+    Attributes
+    ----------
+    times : (T,), s
+    place : (T, 3), of the object, fixed to the Earth, m
+    covariance : (T, 6), of the place, its upper triangle row by row, m^2; NaN where no tube is drawn
+    turned : (T,), angle of the Earth, rad
+    sun : (T, 3), direction of the Sun, fixed to the Earth
+    period : of a revolution, s
+    factor : by which the tube of three sigma is widened
+    view : longitude and latitude among the stars, rad, that the globe is seen from at first
+    """
+
+    title: str
+    view: Literal["globe", "map"]
+    times: Array
+    place: Array
+    covariance: Array
+    turned: Array
+    sun: Array
+    period: float
+    factor: float
+    rows: Sequence[Rows]
+    land: Array
+    start: tuple[float, float] = (0.0, 0.3)
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Sky:
+    """What a station saw of an object: azimuth and elevation, north up and east right."""
+
+    title: str
+    rows: Rows
+    note: str = ""
+
+
+Block = Chart | Orbit | Table | CursorValues | Text | Code | World | Sky
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading, a sentence on what there is to see, and blocks."""
+    """A heading, a sentence on what there is to see, and blocks; one that is `folded` is opened by its heading."""
 
     title: str
     blocks: Sequence[Block]
     intro: str = ""
+    folded: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Tab:
-    """One problem, or one study: a summary first, then sections.  With `times` (K,) it has a cursor and can be played."""
+    """One problem, or one study: a summary first, then sections.  With `times` (K,) it has a cursor and can be played.
+
+    Where it is not to `switch`, its keys are not offered to be switched.
+    """
 
     title: str
     subtitle: str
@@ -164,3 +251,4 @@ class Tab:
     keys: Sequence[Key] = ()
     times: Array | None = None
     show_time: Display = field(default_factory=lambda: Display("s"))
+    switch: bool = True

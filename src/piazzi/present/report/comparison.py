@@ -32,6 +32,7 @@ def comparison_tab(
     planet_radius: float | None = None,
     more: Sequence[Section] = (),
     warning: str = "",
+    orbit: bool = True,
 ) -> Tab:
     """Summary, orbit, errors, consistency and table of a comparison.
 
@@ -42,9 +43,10 @@ def comparison_tab(
     planet_radius : m, drawn to scale about the origin
     more : sections to put before the table, such as a window trade
     warning : of the problem itself, such as of long steps; "" for none
+    orbit : whether the path and the passes are drawn
     """
     views = Views.of(comparison)
-    sections = [*_sections(views, planet_radius)] if views.found else []
+    sections = [*_sections(views, planet_radius, orbit)] if views.found else []
     return Tab(
         title or comparison.source or "Comparison",
         summary(comparison.problem, comparison.tracking, comparison.source or "measurements"),
@@ -56,12 +58,12 @@ def comparison_tab(
     )
 
 
-def _sections(views: Views, planet_radius: float | None) -> list[Section]:
+def _sections(views: Views, planet_radius: float | None, orbit: bool) -> list[Section]:
     known = views.truth is not None
-    paths = orbits(views, planet_radius)
+    paths = orbits(views, planet_radius) if orbit else []
     return [
         *([Section("The orbit", paths, _PLAY)] if paths else []),
-        *([Section("Passes", [sights], _PASSES)] if (sights := passes(views)) else []),
+        *([Section("Passes", [sights], _PASSES)] if orbit and (sights := passes(views)) else []),
         Section(
             "Errors and their predicted standard deviations",
             [*group_charts(views), CursorValues("Values at the cursor")],

@@ -34,8 +34,8 @@ def tab_chooser(tabs: Sequence[Tab]) -> str:
 
 def legend(lines: Sequence[Line]) -> str:
     """Marks and labels of lines that have no entry in the legend of the tab."""
-    found = {line.label: Key(line.label, line.colour, line.dash) for line in lines if line.key < 0}
-    items = "".join(f"<span>{line_mark(key)}{text(key.label)}</span>" for key in found.values())
+    found = {line.label: line for line in lines if line.key < 0}
+    items = "".join(f"<span>{_mark(line)}{text(line.label)}</span>" for line in found.values())
     return f'<div class="legend">{items}</div>' if items else ""
 
 
@@ -53,22 +53,49 @@ def line_mark(key: Key) -> str:
     )
 
 
+def _mark(line: Line) -> str:
+    """What stands for a line in a legend: a dot for points, a cross for crosses."""
+    if line.kind == "points":
+        inside = f'<circle cx="5" cy="4" r="3" fill="{escape(line.colour)}"/>'
+    elif line.kind == "crosses":
+        inside = '<path class="rejected" d="M2 1l6 6m-6 0l6 -6"/>'
+    else:
+        return line_mark(Key(line.label, line.colour, line.dash))
+    return f'<svg width="10" height="8" aria-hidden="true">{inside}</svg>'
+
+
 def table_panel(table: Table) -> str:
     """A table that scrolls by itself where it is too wide."""
+    words = [' class="words"' if i in table.words else "" for i in range(len(table.heads))]
     head = "".join(
-        f'<th scope="col">{text(name)}{f"<small>{text(unit)}</small>" if unit else ""}</th>' for name, unit in table.heads
+        f'<th scope="col"{words[i]}>{text(name)}{f"<small>{text(unit)}</small>" if unit else ""}</th>'
+        for i, (name, unit) in enumerate(table.heads)
     )
     rows = []
     for i, row in enumerate(table.rows):
         key = f' data-key="{table.keys[i]}"' if i < len(table.keys) and table.keys[i] >= 0 else ""
         first, *rest = row
-        rows.append(f'<tr{key}><th scope="row">{text(first)}</th>' + "".join(f"<td>{text(v)}</td>" for v in rest) + "</tr>")
+        rows.append(
+            f'<tr{key}><th scope="row">{text(first)}</th>'
+            + "".join(f"<td{words[i]}>{text(v)}</td>" for i, v in enumerate(rest, 1))
+            + "</tr>"
+        )
     caption = f"<caption>{text(table.caption)}</caption>" if table.caption else ""
     label = text(table.caption) or "Table"
+    size = "panel" if table.half else "panel full"
     return (
-        f'<div class="panel full"><div class="scroll" tabindex="0" role="region" aria-label="{label}">'
+        f'<div class="{size}"><div class="scroll" tabindex="0" role="region" aria-label="{label}">'
         f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div></div>"
     )
+
+
+def save_buttons(title: str) -> str:
+    """Buttons that keep a drawing as a file."""
+    buttons = "".join(
+        f'<button type="button" class="save" data-as="{kind.lower()}" aria-label="{kind} of {text(title)}">{kind}</button>'
+        for kind in ("SVG", "PNG", "CSV")
+    )
+    return f'<div class="saves"><span>Save as</span>{buttons}</div>'
 
 
 class Pool:

@@ -3,17 +3,44 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from hashlib import sha256
 from importlib.resources import files
 from typing import Any
 
-from piazzi.evaluate.quantities import Display
-from piazzi.present.report.blocks import Axis, Block, Chart, CursorValues, Line, Orbit, Section, Tab, Table, Text, Track
-from piazzi.present.report.html import Pool, legend, line_mark, script_json, summary_point, tab_chooser, table_panel, text
+from piazzi.present.report import html
+from piazzi.present.report.blocks import (
+    Block,
+    Chart,
+    Code,
+    CursorValues,
+    Line,
+    Orbit,
+    Section,
+    Sky,
+    Tab,
+    Table,
+    Text,
+    Track,
+    World,
+)
+from piazzi.present.report.html import Pool, line_mark, script_json, text
+from piazzi.present.report.places import axis_data, display_data, noted, sky_data, world_data
 from piazzi.text import printable
 
-SCRIPTS = ("data.js", "scales.js", "chart.js", "orbit.js", "tab.js", "page.js")
+SCRIPTS = (
+    "data.js",
+    "scales.js",
+    "chart.js",
+    "orbit.js",
+    "world.js",
+    "globe.js",
+    "map.js",
+    "sky.js",
+    "save.js",
+    "tab.js",
+    "page.js",
+)
 
 
 def page(title: str, tabs: Sequence[Tab], *, foot: str = "") -> str:
@@ -34,7 +61,7 @@ def page(title: str, tabs: Sequence[Tab], *, foot: str = "") -> str:
     script = "\n".join(_asset(name) for name in SCRIPTS)
     digest = b64encode(sha256(f"\n{script}\n".encode()).digest()).decode("ascii")
     policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
-    chooser = tab_chooser(tabs) if len(tabs) > 1 else ""
+    chooser = html.tab_chooser(tabs) if len(tabs) > 1 else ""
     return f"""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -71,6 +98,9 @@ def _asset(name: str) -> str:
     return files(__package__).joinpath("assets", name).read_text(encoding="utf-8").replace("\r\n", "\n").strip()
 
 
+_AGAIN = '<button type="button" class="quiet unzoom" hidden>Whole run</button>'
+
+
 class _Builder:
     """The HTML of one tab, and meanwhile the data that its charts draw."""
 
@@ -80,7 +110,7 @@ class _Builder:
 
     def tab(self, tab: Tab) -> str:
         sections = "".join(self._section(s) for s in tab.sections)
-        points = "".join(map(summary_point, tab.points))
+        points = "".join(map(html.summary_point, tab.points))
         return f"""<article class="tab" id="{self.name}" aria-label="{text(tab.title)}">
 <h2>{text(tab.title)}</h2><p class="subtitle">{text(tab.subtitle)}</p>
 <dl class="summary">{points}</dl>
@@ -94,7 +124,7 @@ class _Builder:
             "id": self.name,
             "keys": [{"label": printable(k.label), "colour": k.colour, "dash": list(k.dash)} for k in tab.keys],
             "times": None if tab.times is None else self.pool.add_exactly(tab.times),
-            "show": _display(tab.show_time),
+            "show": display_data(tab.show_time),
             "drawings": self.drawings,
         }
 
@@ -109,6 +139,8 @@ class _Builder:
                 f'<input type="range" class="time" min="0" max="{len(tab.times) - 1}" step="1" value="{len(tab.times) - 1}"'
                 ' aria-label="Time"><output class="clock"></output>'
             )
+        if not tab.switch:
+            return f'<div class="bar" role="group" aria-label="Time"><div class="move">{play}{slider}{_AGAIN}</div></div>'
         chips = "".join(
             f'<button type="button" class="chip" data-key="{i}" aria-pressed="true">{line_mark(key)}{text(key.label)}</button>'
             for i, key in enumerate(tab.keys)
@@ -118,31 +150,42 @@ class _Builder:
         blocks = [block for section in tab.sections for block in section.blocks]
         close = any(isinstance(b, Orbit) or (isinstance(b, Chart) and b.single) for b in blocks)
         focus = f'<label class="focus">Look closely at <select>{options}</select></label>' if tab.keys and close else ""
-        again = '<button type="button" class="quiet unzoom" hidden>Whole run</button>'
         return (
             f'<div class="bar" role="group" aria-label="Time and estimators">'
-            f'<div class="move">{play}{slider}{again}{focus}</div>'
+            f'<div class="move">{play}{slider}{_AGAIN}{focus}</div>'
             f'<div class="chips" role="group" aria-label="Estimators shown">{chips}{everyone}</div></div>'
         )
 
     def _section(self, section: Section) -> str:
         intro = f'<p class="intro">{text(section.intro)}</p>' if section.intro else ""
         blocks = "".join(self._block(b) for b in section.blocks)
-        return f'<section><h3>{text(section.title)}</h3>{intro}<div class="grid">{blocks}</div></section>\n'
+        if len(section.blocks) == 1 and isinstance(section.blocks[0], Chart):
+            blocks = blocks.replace('class="panel"', 'class="panel full"', 1)
+        small = " small" if section.blocks and all(isinstance(b, Sky) for b in section.blocks) else ""
+        inside = f'{intro}<div class="grid{small}">{blocks}</div>'
+        if section.folded:
+            return f"<section><details><summary><h3>{text(section.title)}</h3></summary>{inside}</details></section>\n"
+        return f"<section><h3>{text(section.title)}</h3>{inside}</section>\n"
 
     def _block(self, block: Block) -> str:
         match block:
             case Chart():
-                return self._drawing(block.title, block.note, self._chart(block), legend(block.lines))
+                return self._drawing(block.title, block.note, self._chart(block), html.legend(block.lines))
             case Orbit():
                 return self._drawing(block.title, block.note, self._orbit(block))
             case Table():
-                return table_panel(block)
+                return html.table_panel(block)
             case CursorValues():
                 return (
                     f'<div class="panel full"><h4>{text(block.title)}</h4><div class="scroll" tabindex="0" role="region"'
                     f' aria-label="{text(block.title)}"><table class="now"></table></div></div>'
                 )
+            case World():
+                return self._drawing(block.title, block.note, world_data(block, self.pool))
+            case Sky():
+                return self._drawing(block.title, block.note, sky_data(block, self.pool))
+            case Code():
+                return f'<div class="panel full"><pre tabindex="0">{text(block.text)}</pre></div>'
             case Text():
                 return '<div class="panel full">' + "".join(f"<p>{text(p)}</p>" for p in block.paragraphs) + "</div>"
 
@@ -151,7 +194,7 @@ class _Builder:
         remark = f'<p class="remark">{text(note)}</p>' if note else ""
         return (
             f'<figure class="panel"><figcaption><h4>{text(title)}</h4>{legend}</figcaption>'
-            f'<div class="plot" data-drawing="{len(self.drawings) - 1}"></div>{remark}</figure>'
+            f'<div class="plot" data-drawing="{len(self.drawings) - 1}"></div>{remark}{html.save_buttons(title)}</figure>'
         )
 
     def _chart(self, chart: Chart) -> dict[str, Any]:
@@ -159,12 +202,13 @@ class _Builder:
             "kind": "chart",
             "time": chart.time,
             "single": chart.single,
-            "x": _axis(chart.x),
-            "y": _axis(chart.y),
+            "x": axis_data(chart.x),
+            "y": axis_data(chart.y),
             "lines": [self._line(line) for line in chart.lines],
             "levels": [[value, printable(label)] for value, label in chart.levels],
             "ranges": [[low, high, printable(label)] for low, high, label in chart.ranges],
             "column": printable(chart.column),
+            "shades": [] if chart.shades is None else chart.shades.tolist(),
         }
 
     def _line(self, line: Line) -> dict[str, Any]:
@@ -178,6 +222,7 @@ class _Builder:
             "label": printable(line.label),
             "colour": line.colour,
             "dash": list(line.dash),
+            "notes": noted(line.notes),
         }
 
     def _orbit(self, orbit: Orbit) -> dict[str, Any]:
@@ -185,7 +230,7 @@ class _Builder:
             "kind": "orbit",
             "close": orbit.close,
             "labels": [printable(label) for label in orbit.labels],
-            "show": _display(orbit.show),
+            "show": display_data(orbit.show),
             "limits": list(orbit.limits),
             "planet": orbit.planet_radius,
             "tracks": [self._track(track) for track in orbit.tracks],
@@ -195,18 +240,3 @@ class _Builder:
         found = {"x": track.x, "y": track.y, "sx": track.sigma_x, "sy": track.sigma_y, "rho": track.correlation}
         arrays = {name: None if values is None else self.pool.add(values) for name, values in found.items()}
         return {"key": track.key, "label": printable(track.label), **arrays}
-
-
-def _display(show: Display) -> list[Any]:
-    return [printable(show.unit), show.factor]
-
-
-def _axis(axis: Axis) -> Mapping[str, Any]:
-    return {
-        "label": printable(axis.label),
-        "show": _display(axis.show),
-        "scale": axis.scale,
-        "low": axis.low,
-        "high": axis.high,
-        "threshold": axis.threshold,
-    }

@@ -82,6 +82,7 @@ class Chart {
     svg.append(element("text", { x: right, y: height - 4, "text-anchor": "end", class: "label" }, labelled(this.spec.x)));
     this.inside = element("g", { "clip-path": `url(#${id})` });
     svg.append(this.inside);
+    this.stretches(top, bottom);
     this.references(left, right);
     this.drawLines();
     this.hair = element("line", { y1: top, y2: bottom, class: "hair", visibility: "hidden" });
@@ -95,6 +96,14 @@ class Chart {
     this.svg = svg;
     this.refresh();
     this.move();
+  }
+
+  stretches(top, bottom) {
+    const f = this.spec.x.show[1];
+    for (const [from, to] of this.spec.shades) {
+      const [a, b] = [this.sx.place(from * f), this.sx.place(to * f)];
+      this.inside.append(element("rect", { x: a, width: Math.max(b - a, 1.5), y: top, height: bottom - top, class: "range" }));
+    }
   }
 
   references(left, right) {
@@ -122,6 +131,9 @@ class Chart {
         this.inside.append(line.edge);
       } else if (line.kind === "points") {
         line.mark = element("path", { ...style, d: this.dots(line), class: "dots" });
+        this.inside.append(line.mark);
+      } else if (line.kind === "crosses") {
+        line.mark = element("path", { d: this.crosses(line), class: "rejected" });
         this.inside.append(line.mark);
       } else if (line.kind === "bars") {
         line.mark = element("path", { ...style, d: this.sticks(line), class: "bars" });
@@ -179,6 +191,14 @@ class Chart {
     return out;
   }
 
+  // What is beyond the axis is shown at its edge.
+  crosses({ x, y }) {
+    const [top, bottom] = [this.sy.to + 5, this.sy.from - 5];
+    let out = "";
+    for (let i = 0; i < x.length; i++) if (!Number.isNaN(y[i])) out += cross(this.sx.place(x[i]), Math.min(Math.max(this.sy.place(y[i]), top), bottom));
+    return out;
+  }
+
   sticks({ x, y }) {
     const foot = this.sy.from;
     let out = "";
@@ -216,8 +236,18 @@ class Chart {
       .filter((line) => this.shown(line) && line.x.length)
       .map((line) => {
         const i = nearest(line.x, x);
-        return { line, x: line.x[i], value: line.y[i] };
-      });
+        const note = line.notes ? line.notes.words[line.notes.of[i]] : "";
+        return { line, x: line.x[i], value: line.y[i], note };
+      })
+      .filter(({ line, x: there }) => !loose(line) || this.lines.length < 6 || Math.abs(this.sx.place(there) - this.sx.place(x)) < 12);
+  }
+
+  table() {
+    const [xs, ys] = [this.spec.x, this.spec.y].map((axis) => labelled(axis));
+    const rows = [["series", xs, ys, "note"]];
+    for (const line of this.lines)
+      line.x.forEach((x, i) => Number.isNaN(line.y[i]) || rows.push([line.name === line.label ? line.name : `${line.name}: ${line.label}`, x, line.y[i], line.notes ? line.notes.words[line.notes.of[i]] : ""]));
+    return rows;
   }
 
   valueAtCursor(key) {
@@ -264,10 +294,10 @@ class Chart {
       this.brush.setAttribute("width", Math.abs(b - a));
     }
     const [unit, xUnit] = [this.spec.y.show[0], this.spec.x.show[0]];
-    const rows = found.map(({ line, value }) => ({
+    const rows = found.map(({ line, value, note }) => ({
       colour: line.colour,
       name: this.spec.single || line.key < 0 ? line.label : line.name,
-      value: withUnit((line.kind === "band" ? "±" : "") + number(value), unit),
+      value: withUnit((line.kind === "band" ? "±" : "") + number(value), unit) + (note ? `, ${note}` : ""),
     }));
     showTip(event, `${this.spec.time ? "" : `${this.spec.x.label} `}${withUnit(number(found[0].x), xUnit)}`, rows);
   }
@@ -290,6 +320,10 @@ class Chart {
     this.hair.setAttribute("visibility", "hidden");
     this.brush.setAttribute("width", 0);
   }
+}
+
+function loose(line) {
+  return line.kind === "points" || line.kind === "crosses";
 }
 
 function scaled(axis, factor) {

@@ -160,6 +160,13 @@ class Orbit {
     this.axes();
   }
 
+  table() {
+    const [x, y] = this.spec.labels.map((label) => labelled({ label, show: this.spec.show }));
+    const rows = [["series", `time [s]`, x, y]];
+    for (const t of this.tracks) t.x.forEach((v, i) => rows.push([t.label, this.tab.times[i], v, t.y[i]]));
+    return rows;
+  }
+
   described() {
     return `${this.spec.title}: ${this.spec.labels.join(" and ")}; ${this.tracks.map((t) => t.label).join(", ")}`;
   }

@@ -57,6 +57,9 @@ function listenToTabs(tabs) {
 const TABS = DATA.tabs.map((spec) => new Tab(spec));
 listenToTheme();
 listenToTabs(TABS);
-addEventListener("beforeprint", () => TABS.forEach((tab) => tab.drawAll(400)));
+addEventListener("beforeprint", () => {
+  for (const fold of document.querySelectorAll("details")) fold.open = true;
+  TABS.forEach((tab) => tab.drawAll(400));
+});
 addEventListener("afterprint", () => TABS.forEach((tab) => tab.drawAll()));
 document.documentElement.dataset.ready = "true";

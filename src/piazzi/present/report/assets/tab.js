@@ -20,8 +20,9 @@ class Tab {
     [this.select, this.whole, this.everyone] = [".focus select", ".unzoom", ".everyone"].map(find);
     this.drawings = [...this.root.querySelectorAll(".plot")].map((box) => {
       const drawing = spec.drawings[box.dataset.drawing];
-      return new (drawing.kind === "orbit" ? Orbit : Chart)(this, box, drawing);
+      return new { orbit: Orbit, chart: Chart, globe: Globe, map: WorldMap, sky: Sky }[drawing.kind](this, box, drawing);
     });
+    listenToSaving(this);
     this.columns = this.drawings.filter((d) => d.spec.column);
     this.listed();
     this.listen();
@@ -57,9 +58,15 @@ class Tab {
       }
     });
     for (const drawing of this.drawings) {
-      drawing.draw(Math.round(drawing.box.clientWidth) || 540);
+      if (!drawing.box.closest("details:not([open])")) drawing.draw(Math.round(drawing.box.clientWidth) || 540);
       watch.observe(drawing.box);
     }
+    for (const fold of this.root.querySelectorAll("details")) fold.addEventListener("toggle", () => this.unfolded(fold));
+  }
+
+  // What is folded is drawn when it is opened.
+  unfolded(fold) {
+    for (const drawing of this.drawings) if (fold.open && fold.contains(drawing.box)) drawing.draw(Math.round(drawing.box.clientWidth) || 540);
   }
 
   // Hidden ones too; on paper they are smaller than on a screen, and their letters are not.
