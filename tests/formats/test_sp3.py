@@ -139,7 +139,7 @@ def test_satellites_of_version_a_have_numbers(tmp_path):
     [
         ("EOF\n", "", "ends without EOF"),
         ("GPS ccc", "XYZ ccc", "line 5: time scale 'XYZ'"),
-        ("13368.836676", "13368.x36676", "line 10: position of G01 is '13368.x36676'"),
+        ("13368.836676", "13368.x36676", "line 10: position of 'G01' is '13368.x36676'"),
         ("*  2015  5  5  0  5  0.5", "*  2015  5  5  0  0  0.0", "line 13: the epoch is not later"),
         ("*  2015  5  5  0  5  0.5", "*  2015  5 35  0  5  0.5", "line 13: 2015-5-35"),
         ("/* comment", "?? comment", "line 8: no line begins with"),

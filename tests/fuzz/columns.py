@@ -1,4 +1,4 @@
-"""Files of lasers, precise orbits, astrometry and space surveillance: good ones, small, for `tracked.Tracked` to damage."""
+"""Files of lasers, precise orbits, astrometry, space surveillance, and tables: good ones, small, for `tracked.Tracked`."""
 
 from tests.fuzz.tracked import Tracked
 
@@ -141,3 +141,29 @@ class Surveillance(Tracked):
 
     def texts(self) -> list[str]:
         return ["\n".join(B3) + "\n", "\n".join(B3[:2] * 3) + "\n", PLAIN]
+
+
+TABLE = """# frame = ITRF
+week;sow;x [km];y [m];z;mode
+1843;172800.25;13368.836676;-12067.323612;19408.991069;3D
+1843;173100;13427.144673;-11316.304150;19821.250975;3D
+"""
+DATED = """# range = two-way
+time[UTC],station,object,range [km],azimuth [deg],elevation [deg],sigma range [m],pressure [Pa]
+2024-05-05T12:00:00.5,BER,SAT,1000.25,90,45,7,95000
+2024-05-05T12:00:10.25,BER,SAT,1010.25,91,46,7,
+2024-05-05T12:00:05,ROM,SAT,,92,47,,
+"""
+PLACES = (
+    "# epoch = 2024-05-05T12:00:00 UTC\ntime\tlatitude[deg]\tlongitude[deg]\theight[km]\n0\t48\t11\t500\n10.5\t49\t12\t501\n"
+)
+
+
+class Table(Tracked):
+    """Tables of measurements."""
+
+    ending = "csv"
+
+    def texts(self) -> list[str]:
+        plain = "time,x[km],y[km],z[km],vx[m/s],vy[m/s],vz[m/s]\n2024-05-05T12:00:00Z,1,2,3,4,5,6\n"
+        return [DATED, PLACES, plain, TABLE]

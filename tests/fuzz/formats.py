@@ -536,9 +536,14 @@ class SurveillanceFormat(columns.Surveillance, Format):
     """Observations of space surveillance."""
 
 
+class TableFormat(columns.Table, Format):
+    """Tables of measurements."""
+
+
 FORMATS: dict[str, type[Format]] = {
     "scenario": Scenario, "csv": Csv, "npz": Npz, "nc": NetCdf, "checkpoint": Checkpoint, "follow": Follow,
     "log": StudyLog, "store": StudyStore, "expression": Expression,
     "tdm": TdmFormat, "oem": OemFormat, "opm": OpmFormat,
     "laser": LaserFormat, "sp3": Sp3Format, "astrometry": AstrometryFormat, "surveillance": SurveillanceFormat,
+    "table": TableFormat,
 }  # fmt: skip

@@ -8,7 +8,7 @@ import pytest
 
 FUZZ = Path(__file__).with_name("fuzz.py")
 FORMATS = ["scenario", "csv", "npz", "nc", "checkpoint", "follow", "log", "store", "expression", "tdm", "oem", "opm"]
-FORMATS += ["laser", "sp3", "astrometry", "surveillance"]
+FORMATS += ["laser", "sp3", "astrometry", "surveillance", "table"]
 
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="children with limits are made as Linux makes them"

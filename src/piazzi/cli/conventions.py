@@ -18,6 +18,7 @@ _OPTIONS: tuple[tuple[str, str, str, bool], ...] = (
     ("interval", "SECONDS", "Over which range rates are averaged.", False),
     ("interval-reference", "PART", "Of that interval, what times are of: start, middle or end.", False),
     ("repair", "WHAT", "Mend what contradicts its neighbours: exponent, of ranges of space surveillance.", False),
+    ("debias", "FILE", "Take biases of star catalogues off asteroid astrometry: bias.dat of Eggl et al. 2020.", False),
     ("columns", "NAMES", "What columns of tables are: 'week=gps_week sow=gps_tow x=X[km] ignore=Q'.", False),
     ("scale", "SCALE", "Time scale of dates that name none: UTC, GPS, ...", False),
     ("time", "SCALE", "Time scale of a station's dates, as BER=GPS; may be repeated.", True),

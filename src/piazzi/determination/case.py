@@ -13,7 +13,7 @@ from piazzi.text import nearest, one_line
 # What files leave open, by the names that `read_tracking` takes; `cli.conventions` has their lines of help
 ANSWERS = (
     "range", "angles", "tag", "frame", "corrections", "interval", "interval_reference", "repair", "time", "sigma", "scale",
-    "columns",
+    "columns", "debias",
 )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from piazzi.formats.astrometry import settled
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.dates import read_dates
 from piazzi.formats.fields import number
@@ -47,7 +48,7 @@ def read_psv(data: bytes, name: str, told: Conventions) -> Observations:
                 raise ValueError(f"the line has {len(cells)} cells; the columns are {len(header)}")
             else:
                 observe(rows, dict(zip(header, cells, strict=False)), line)
-        return rows.table(name)
+        return settled(rows.table(name), told)
     except ValueError as error:
         raise ValueError(f"{name}: line {line}: {error}") from None
 
@@ -78,7 +79,7 @@ def read_xml(data: bytes, name: str, told: Conventions) -> Observations:
 
     walk(source, data, begins, ends)
     try:
-        return rows.table(name)
+        return settled(rows.table(name), told)
     except ValueError as error:
         source.refuse(data.count(b"\n") + 1, str(error))
 

@@ -10,6 +10,7 @@ import math
 import re
 from dataclasses import dataclass
 
+from piazzi.formats.astrometry import settled
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.designations import unpack
 from piazzi.formats.fields import calendar_day, integer, number
@@ -45,7 +46,7 @@ def read(data: bytes, name: str, told: Conventions) -> Observations:
                 _take(reader, text.rstrip("\r"), line)
         if reader.waiting:
             raise ValueError(f"the second line of the observation in line {reader.waiting[1]} is missing")
-        return reader.rows.table(name)
+        return settled(reader.rows.table(name), told)
     except ValueError as error:
         raise ValueError(f"{name}: line {line}: {error}") from None
 

@@ -155,7 +155,7 @@ def _epoch(file: _File, text: str) -> None:
 
 def _position(file: _File, text: str, line: int) -> None:
     name = _satellite(text[1:4].strip())
-    place = tuple(1e3 * number(text[a : a + 14].strip(), f"position of {name}") for a in (4, 18, 32))
+    place = tuple(1e3 * number(text[a : a + 14].strip(), f"position of {name!r}") for a in (4, 18, 32))
     if not any(place) or all(abs(value) > 1e3 * _NOTHING for value in place):
         file.last = None
         file.left_out["positions that are missing"] = file.left_out.get("positions that are missing", 0) + 1
