@@ -74,7 +74,7 @@ def test_what_the_user_and_the_file_say_goes_before(tmp_path):
 
 
 def test_pixels_are_those_of_equal_area_whose_centres_are_in_them():
-    """Centres by the formulas of Gorski et al. (2005), rings that begin at longitude zero; as many random directions in each."""
+    """Centres by the formulas of Gorski et al. (2005), rings that begin at longitude zero; as many directions in each."""
     sides = 4
     p = np.arange(12 * sides**2)
     z, longitude = np.empty(len(p)), np.empty(len(p))
