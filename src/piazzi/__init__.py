@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from piazzi import earth, formats, orbit
     from piazzi.determination.determining import determine
+    from piazzi.determination.ephemerides import ephemeris
     from piazzi.determination.initial import InitialOrbits, initial_orbits
     from piazzi.determination.result import Determination
     from piazzi.determination.unknowns import Estimated
@@ -120,6 +121,7 @@ _WHERE = {
         "piazzi.study": "Study read_store",
         "piazzi.present.report": "write_report",
         "piazzi.determination.determining": "determine",
+        "piazzi.determination.ephemerides": "ephemeris",
         "piazzi.determination.initial": "InitialOrbits initial_orbits",
         "piazzi.determination.result": "Determination",
         "piazzi.determination.unknowns": "Estimated",
@@ -137,10 +139,10 @@ __all__ = [
     "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise", "Propagation", "Ralston",
     "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter",
     "Station", "Study", "Table", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade",
-    "choose_substeps", "compare", "determine", "difference", "earth", "formats", "initial_orbits", "kepler_transition",
-    "load", "observability", "orbit", "passes", "predict", "propagate", "propagate_kepler", "read_ephemeris", "read_store",
-    "read_tracking", "simulate", "step_warning", "substep_error", "update", "windows", "with_gauss_markov", "with_prior_at",
-    "write_report",
+    "choose_substeps", "compare", "determine", "difference", "earth", "ephemeris", "formats", "initial_orbits",
+    "kepler_transition", "load", "observability", "orbit", "passes", "predict", "propagate", "propagate_kepler",
+    "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning", "substep_error", "update", "windows",
+    "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip
 
 

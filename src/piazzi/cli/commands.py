@@ -11,7 +11,7 @@ from piazzi.cli.options import Group
 from piazzi.text import nearest
 
 GROUPS = {
-    "Orbits from tracking": ("determine", "tracking", "propagate", "difference"),
+    "Orbits from tracking": ("determine", "tracking", "propagate", "ephemeris", "difference"),
     "Estimators side by side": ("compare", "estimate", "study", "windows", "observability", "report"),
     "Scenarios and data": ("demo", "scenarios", "simulate", "data"),
 }
@@ -61,6 +61,7 @@ def piazzi() -> None:
       piazzi windows tracking.npz               how long a window has to be
       piazzi observability b612-range-q0        what can be seen, and how well
       piazzi propagate orbit.oem --to "3 day"   where it will be, how sure
+      piazzi ephemeris orbit.oem --from 7090    where and when it is seen
       piazzi difference fit.oem truth.sp3       how far two orbits are apart
       piazzi report tracking.npz -o page.html   a self-contained interactive page
       piazzi scenarios list                     what is built in

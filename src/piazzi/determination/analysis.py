@@ -19,7 +19,8 @@ class Analysis:
 
     Attributes
     ----------
-    residual : (J, m), observed minus computed, SI; NaN where there is none
+    residual : (J, m), observed minus computed, SI, along an angle on the sky; NaN where there is none
+    computed : (J, m), what the solution makes of the measurements, an angle within half a turn of what was observed
     whitened : (J, m), the same in units of the noise, components of a row made independent
     rows : (J, m, n), minus the derivatives of `whitened` by the first state and the constants
     prior : (p, n), rows that the priors of the constants are worth
@@ -27,6 +28,7 @@ class Analysis:
     """
 
     residual: Array
+    computed: Array
     whitened: Array
     rows: Array
     prior: Array
@@ -65,11 +67,12 @@ def analysed(given: Setup, states: Array) -> Analysis:
     sigma = np.sqrt(np.diagonal(problem.station_noise, axis1=1, axis2=2))[stations]
     full = problem.station_correlated[stations].astype(np.bool_)[:, None]
     # along an angle on the sky, as kernels have it; of components with a full covariance whitened ones are mixed
-    residual = np.where(full, wrapped(problem, stations, inputs.z - computed), shot.innovations * sigma)
+    apart = wrapped(problem, stations, inputs.z - computed)
+    residual = np.where(full, apart, shot.innovations * sigma)
     constants = 6  # and processes, of which as much is known
     spread = np.sqrt(np.diag(problem.covariance))[constants:]
     known = np.flatnonzero(spread > 0)
     prior = np.zeros((len(known), problem.model.n))
     prior[np.arange(len(known)), constants + known] = 1.0 / spread[known]
     miss = (states[0, constants:] - problem.mean[constants:])[known] / spread[known]
-    return Analysis(residual, shot.innovations, shot.rows.reshape(J, m, -1), prior, -miss)
+    return Analysis(residual, inputs.z - apart, shot.innovations, shot.rows.reshape(J, m, -1), prior, -miss)

@@ -10,6 +10,7 @@ import numpy as np
 from piazzi.determination.setup import Setup, follow
 from piazzi.earth import Epoch
 from piazzi.estimate.estimator import Estimate
+from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
 
@@ -44,13 +45,12 @@ def _from(given: Setup, estimate: Estimate, k: int, t: Array) -> tuple[Array, Ar
     out, cov = np.empty((len(t), len(x))), np.empty((len(t), *P.shape))
     for side in (t >= start, t < start):
         if side.any():
-            out[side], cov[side] = _carried(given, start, x, P, t[side])
+            out[side], cov[side] = carried_to(given.problem, given.chosen.max_step, start, x, P, t[side])
     return out, cov
 
 
-def _carried(given: Setup, start: float, x: Array, P: Array, t: Array) -> tuple[Array, Array]:
-    """By transition matrices, forwards or backwards."""
-    step = given.chosen.max_step
+def carried_to(problem: Problem, step: float, start: float, x: Array, P: Array, t: Array) -> tuple[Array, Array]:
+    """States (K, n) and covariances at times that are all after `start`, or all before, by steps of at most `step`."""
     order = np.unique(t) if t[0] >= start else np.unique(t)[::-1]
     nodes, marks = [start], []
     for when in order.tolist():
@@ -58,7 +58,7 @@ def _carried(given: Setup, start: float, x: Array, P: Array, t: Array) -> tuple[
             parts = 1 if when > nodes[-1] else ceil((nodes[-1] - when) / step)
             nodes += np.linspace(nodes[-1], when, parts + 1)[1:].tolist()
         marks.append(len(nodes) - 1)
-    states, Phi = follow(given.problem, np.array(nodes), x, step)
+    states, Phi = follow(problem, np.array(nodes), x, step)
     total, now = {0: np.eye(len(x))}, np.eye(len(x))
     for i, one in enumerate(Phi, start=1):
         now = one @ now

@@ -25,16 +25,17 @@ def table(found: Any) -> dict[str, Array]:
     observed = given.tracking.values[rows, components]
     sigma = np.sqrt(np.diagonal(given.problem.station_noise, axis1=1, axis2=2)[which, components])
     absent = np.full(len(rows), np.nan)
-    residual, whitened = absent, absent
+    residual, computed, whitened = absent, absent, absent
     if found.analysis is not None:
-        residual, whitened = found.analysis.residual[rows, components], found.analysis.whitened[rows, components]
+        own = found.analysis
+        residual, computed, whitened = (a[rows, components] for a in (own.residual, own.computed, own.whitened))
     used = found.keep[rows]
     weights = found.estimate.details.get("weights")
     weight = np.ones(len(rows)) if weights is None else np.asarray(weights)[rows]
     return {
         "t": given.tracking.row_times[rows], "station": labels, "component": kinds,
         "unit": np.array([KINDS[kind].unit for kind in kinds], dtype=object), "observed": observed,
-        "computed": observed - residual, "o_minus_c": residual, "whitened": whitened, "sigma": sigma,
+        "computed": computed, "o_minus_c": residual, "whitened": whitened, "sigma": sigma,
         "weight": np.where(used, weight, 0.0), "used": used, "reason": found.reasons[rows], "observation": observation,
     }  # fmt: skip
 

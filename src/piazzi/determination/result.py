@@ -152,11 +152,20 @@ class Determination:
 
         return report(self, path)
 
-    def ephemeris(self, span: Any = None, step: float | None = None, frame: str | None = None) -> Any:
-        """States and covariances over a span, an `Ephemeris`; default the rows that were used, to the solution."""
-        from piazzi.determination.products import ephemeris
+    def ephemeris(
+        self, span: Any = None, step: Any = None, frame: str | None = None, *, station: Any = None, when: Any = "tonight",
+        **seen: Any,
+    ) -> Any:  # fmt: skip
+        """States and covariances over a span, an `Ephemeris`; with a `station` what it sees of the orbit, as `pz.ephemeris`."""
+        if station is not None:
+            from piazzi.determination.ephemerides import STEP, ephemeris
 
-        return ephemeris(self, span, step, frame)
+            return ephemeris(self, station, when, step=STEP if step is None else step, **seen)
+        if seen:
+            raise ValueError(f"{next(iter(seen))}: what is seen is seen from somewhere: give station=")
+        from piazzi.determination.products import ephemeris as states
+
+        return states(self, span, step, frame)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         from piazzi.determination.showing import rich

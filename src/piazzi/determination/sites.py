@@ -48,17 +48,22 @@ class Context:
         name = self.observations.participants[index] if index >= 0 else ""
         if not name:
             raise ValueError(f"{self.where}the file does not say which station measured: no station can be found for it")
-        if self.sites is None:
-            raise ValueError(f"{self.where}where is station {name}? Give it with --stations FILE (TOML or SINEX), or ilrs")
-        found = _matched(name, self.sites)
-        if found is None:
-            raise ValueError(f"{self.where}no station {name} in --stations{nearest(name, list(self.sites)[:2000])}")
-        return found
+        return station_named(name, self.sites, self.where)
 
     @property
     def where(self) -> str:
         """How messages begin."""
         return f"{self.observations.files[0]}: " if self.observations.files else ""
+
+
+def station_named(name: str, sites: StationList | None, where: str = "") -> Station:
+    """The station of a list; raises ValueError with how to give it."""
+    if sites is None:
+        raise ValueError(f"{where}where is station {name}? Give it with --stations FILE (TOML or SINEX), or ilrs")
+    found = _matched(name, sites)
+    if found is None:
+        raise ValueError(f"{where}no station {name} in --stations{nearest(name, list(sites)[:2000])}")
+    return found
 
 
 def _matched(name: str, sites: StationList) -> Station | None:

@@ -122,11 +122,11 @@ def _solve(d: Definition, out: dict[str, float], functions: Mapping[str, Any], m
 
 
 def _rates(values: Mapping[str, float], functions: Mapping[str, Any], model: Any) -> list[float]:
-    """dx/dt at the states and the time among the values."""
+    """dx/dt at the states and the time among the values; definitions that have a value there keep it."""
     here = dict(values)
     wanted = needed(model.dynamics, model.definitions)
     for d in model.definitions:
-        if set(d.provides) & wanted:
+        if set(d.provides) & wanted and not here.keys() >= set(d.provides):
             _define(d, here, functions, model)
     return [evaluate(e, here) for e in model.dynamics]
 
@@ -141,10 +141,12 @@ def _nearby(values: Mapping[str, float], offset: float, functions: Mapping[str, 
 def _elsewhen(values: Mapping[str, float], offset: float, functions: Mapping[str, Any], model: Any) -> Sequence[float]:
     """States at t + offset by a few steps of the classical Runge-Kutta method, a light time by one."""
     states, steps = model.states, 4 if abs(offset) > SHORT else 1
+    here = {name for d in model.definitions for name in d.provides}  # which are other ones there
+    given = {name: value for name, value in values.items() if name not in here}
     x, t, h = [values[s] for s in states], values.get(TIME, 0.0), offset / steps
 
     def rates(x: Sequence[float], t: float) -> list[float]:
-        return _rates({**values, **dict(zip(states, x, strict=True)), TIME: t}, functions, model)
+        return _rates({**given, **dict(zip(states, x, strict=True)), TIME: t}, functions, model)
 
     for i in range(steps):
         now = t + i * h

@@ -1,0 +1,288 @@
+"""An orbit over time, from whatever says one: where it is and how sure that is, at any date, on the axes of the GCRF."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from piazzi.determination.beliefs import beliefs, carried_to
+from piazzi.determination.guesses import CARTESIAN, SCHEMA, Guess, guess_of
+from piazzi.determination.orbit_forces import Chosen, chosen_forces
+from piazzi.earth import Epoch, Forces
+from piazzi.earth.rotation import frame_named
+from piazzi.formats import read_ephemeris
+from piazzi.formats.ephemeris import MeanElements
+from piazzi.kernels import RungeKutta8
+from piazzi.opening import opened as opened_file
+from piazzi.orbit import sgp4_states
+from piazzi.orbit.paths import opened, path_of
+from piazzi.orbit.starting import in_axes, start_of
+from piazzi.problem import Gaussian, Problem
+from piazzi.problem.checks import Array
+
+HDF5, JSON = b"\x89HDF", b"{"
+Beliefs = Callable[[Array], tuple[Array, Array | None]]
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """An orbit over time.
+
+    Attributes
+    ----------
+    name : of the object, "" where nobody says it
+    problem : with the forces that move it; times are past its epoch
+    beliefs : gives states (K, 6) and covariances (K, 6, 6), or None, at times (K,)
+    source, assumed : where it is from, and what was taken where nothing was said
+    spans : pairs of times between which it is known; empty for all times
+    """
+
+    name: str
+    problem: Problem
+    beliefs: Beliefs
+    source: str
+    assumed: tuple[str, ...] = ()
+    spans: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def epoch(self) -> Epoch:
+        """That times are past."""
+        return self.problem.epoch  # type: ignore[no-any-return]
+
+    def check(self, t: Array) -> None:
+        """Raise ValueError unless it is known at all times."""
+        if self.spans and len(t):
+            known = np.zeros(len(t), dtype=bool)
+            for first, last in self.spans:
+                known |= (t >= first - 1e-6) & (t <= last + 1e-6)
+            if not known.all():
+                raise ValueError(
+                    f"{self.source} has no state of {self.name or 'the object'} at {self.epoch + float(t[~known][0])}: it goes "
+                    f"from {self.epoch + self.spans[0][0]} to {self.epoch + self.spans[-1][1]} (piazzi propagate goes on)"
+                )
+
+
+def course_of(given: Any, near: Epoch, *, chosen: str | None = None, forces: Any = None) -> Course:
+    """The orbit that is given.
+
+    Parameters
+    ----------
+    given : a `Determination`, its JSON or .nc, a file (OEM, OPM, SP3, CPF, TLE, OMM), an ephemeris, elements or a state as text
+    near : a date by which one of several states is taken
+    chosen : name of the object in a file of several
+    forces : of an orbit that is given by one state, as `determine` takes them; default by height
+
+    Raises
+    ------
+    ValueError
+        Where it is no orbit.
+    OSError
+        Where a file cannot be read.
+    """
+    if hasattr(given, "setup") and hasattr(given, "estimate"):
+        return _of_determination(given)
+    if isinstance(given, Mapping):
+        return _of_document(given, "the determination")
+    if isinstance(given, Guess) or (isinstance(given, str) and "=" in given and not os.path.exists(given)):
+        guess = guess_of(given, near)
+        return _of_state("", guess.epoch, guess.state, None, guess.source.removeprefix("--"), forces, guess.assumed)
+    if isinstance(given, (str, os.PathLike)):
+        facts = _document(os.fspath(given))
+        if facts is not None:
+            return _of_document(facts, os.fspath(given))
+    return _of_orbit(given, near, chosen, forces)
+
+
+def _of_determination(found: Any) -> Course:
+    setup, zero = found.setup, found.setup.measured.epoch
+
+    def at(t: Array) -> tuple[Array, Array | None]:
+        return beliefs(setup, found.estimate, [zero + float(x) for x in t])
+
+    return Course(found.object, setup.problem, at, "the determination", setup.assumed)
+
+
+def _document(path: str) -> Mapping[str, Any] | None:
+    """The object of a determination in a file of JSON or NetCDF; None for another file."""
+    with opened_file(path) as file:
+        start = file.read(512)
+        if start.lstrip().startswith(JSON):
+            return _parsed(start + file.read(2**24), path)
+    if not start.startswith(HDF5):
+        return None
+    import h5py
+
+    with h5py.File(path, "r") as data:
+        text = data.attrs.get("determination")
+    if text is None:
+        raise ValueError(f"{path}: there is no determination in it")
+    return _parsed(text, path)
+
+
+def _parsed(text: Any, path: str) -> Mapping[str, Any]:
+    try:
+        facts = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: no JSON of a determination: {' '.join(str(error).split())}") from None
+    if not isinstance(facts, dict) or facts.get("schema") != SCHEMA:
+        raise ValueError(f"{path}: this is not a determination ({SCHEMA})")
+    return facts
+
+
+def _of_document(facts: Mapping[str, Any], source: str) -> Course:
+    """The state, its covariance and the constants of a determination, with the forces that it says."""
+    guess = guess_of(facts, Epoch.at(0.0))
+    try:
+        names = [str(name) for name in facts["names"]]
+        P, mean = np.array(facts["covariance"], dtype=float), np.array(facts["mean"], dtype=float)
+        said = {**facts["forces"]}
+        constants = {str(one["name"]): (float(one["value"]), float(one["sigma"])) for one in facts["estimated"]}
+        frame, name = str(facts["frame"]), str(facts.get("object") or "")
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{source}: the determination is not whole: {' '.join(str(error).split())}") from None
+    if not (np.isfinite(P).all() and P.shape == (len(names), len(names)) and np.isfinite(mean).all()):
+        raise ValueError(f"{source}: the determination has no finite covariance")
+    chosen = chosen_forces(_forces_of(said, source), guess.state, name=name)
+    own = [p for p in chosen.forces.parameters if p in constants and p in names]
+    roles = {p: role for p, role in chosen.roles.items() if p in own} | dict.fromkeys(own, "estimated")
+    values: dict[str, Any] = {**_numbers(chosen)}
+    values |= {p: Gaussian(constants[p][0], max(constants[p][1], 1e-300) ** 2) for p in own}
+    problem = _problem(chosen, roles, values, guess.epoch, guess.state, np.zeros((6, 6)), name)
+    order = [names.index(p) for p in (*CARTESIAN, *problem.model.constants)]
+    J = np.eye(len(order))
+    J[:6, :6] = in_axes(frame_named(frame), "GCRF", [guess.epoch])[0]
+    moved = J @ P[np.ix_(order, order)] @ J.T
+    first = np.concatenate([guess.state, mean[order[6:]]])
+    assumed = tuple(str(text) for text in facts.get("assumed", ()))
+    return Course(name, problem, _carrying(problem, chosen.max_step, first, moved), source, assumed)
+
+
+def _forces_of(said: Mapping[str, Any], source: str) -> Forces:
+    """The forces that a determination says it used."""
+    try:
+        return Forces(
+            gravity=str(said["gravity"]), degree=int(said["degree"]), bodies=tuple(said["bodies"]), tides=tuple(said["tides"]),
+            relativity=said["relativity"], radiation=said["radiation"] or False, drag=said["drag"] or False,
+            empirical=tuple(said["empirical"]),
+        )  # fmt: skip
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{source}: its forces cannot be taken up: {' '.join(str(error).split())}") from None
+
+
+def _of_orbit(given: Any, near: Epoch, chosen: str | None, forces: Any) -> Course:
+    """A file or an object of others: rows between which it is known, mean elements, or one state to go on from."""
+    what = read_ephemeris(given) if isinstance(given, (str, os.PathLike)) else given
+    name, found = opened(what, chosen)
+    source = os.fspath(given) if isinstance(given, (str, os.PathLike)) else name
+    if isinstance(found, MeanElements):
+        r, v = sgp4_states(found, found.epoch, "GCRF")
+        problem = _moved_by(forces, np.concatenate([r, v]), found.epoch, found.name or name)
+        mean_elements = found
+
+        def by_theory(t: Array) -> tuple[Array, Array | None]:
+            place, speed = sgp4_states(mean_elements, [mean_elements.epoch + float(x) for x in t], "GCRF")
+            return np.hstack([place, speed]), None
+
+        return Course(problem.name, problem, by_theory, source, ("by SGP4, which has no covariance",))
+    if not isinstance(found, tuple):
+        raise ValueError(f"{source}: an orbit is a file, an ephemeris, elements or a determination")
+    if sum(int(np.isfinite(arc.position).all(axis=1).sum()) for arc in found) < 2:
+        start = start_of(what, near, chosen)
+        return _of_state(start.name, start.epoch, start.state, start.covariance, source, forces)
+    return _of_rows(name, found, source, start_of(what, near, chosen), forces)
+
+
+def _of_rows(name: str, arcs: Sequence[Any], source: str, start: Any, forces: Any) -> Course:
+    problem = _moved_by(forces, start.state, start.epoch, start.name or name)
+    path = path_of(start.name or name, tuple(arcs), start.epoch, None)
+    spans = []
+    for arc in arcs:
+        whole = arc.t[np.isfinite(arc.position).all(axis=1)] + (arc.epoch - start.epoch)
+        first, last = (None if end is None else end - start.epoch for end in arc.useable)
+        spans.append((max(whole.min(), first or -np.inf), min(whole.max(), np.inf if last is None else last)))
+    nodes = np.unique(np.concatenate([arc.covariance_t + (arc.epoch - start.epoch) for arc in arcs]))
+
+    def between(t: Array) -> tuple[Array, Array | None]:
+        r, v = path.states(t)
+        return np.hstack([r, v]), _between_nodes(path, nodes, t, r, v)
+
+    return Course(problem.name, problem, between, source, (), tuple(sorted(spans)))
+
+
+def _between_nodes(path: Any, nodes: Array, t: Array, r: Array, v: Array) -> Array | None:
+    """Covariances (K, 6, 6) of positions, that of the nearest row turned with the orbit; None where the file has none."""
+    if not len(nodes):
+        return None
+    place = np.clip(np.searchsorted(nodes, t), 1, len(nodes) - 1) if len(nodes) > 1 else np.zeros(len(t), dtype=int)
+    nearest = nodes[np.where((place > 0) & (t - nodes[place - 1] < nodes[place] - t), place - 1, place)]
+    there, speed = path.states(nearest)
+    P = path.covariances(nearest, there, speed)
+    turn = np.swapaxes(_axes(r, v), 1, 2) @ _axes(there, speed)
+    out = np.zeros((len(t), 6, 6))
+    out[:, :3, :3] = turn @ P @ np.swapaxes(turn, 1, 2)
+    return out
+
+
+def _axes(r: Array, v: Array) -> Array:
+    """Rows (K, 3, 3) of radial, transverse and normal."""
+    radial = r / np.linalg.norm(r, axis=1, keepdims=True)
+    normal = np.cross(r, v)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.stack([radial, np.cross(normal, radial), normal], axis=1)
+
+
+def _of_state(
+    name: str, epoch: Epoch, state: Array, P: Array | None, source: str, forces: Any, assumed: tuple[str, ...] = ()
+) -> Course:
+    chosen = chosen_forces(forces, state, name=name)
+    problem = _moved_by(forces, state, epoch, name, chosen)
+    carry = _carrying(problem, chosen.max_step, state, np.zeros((6, 6)) if P is None else P)
+
+    def at(t: Array) -> tuple[Array, Array | None]:
+        x, covariance = carry(t)
+        return x, None if P is None else covariance
+
+    said = tuple(f"{p} = {problem.parameters[p]:.3g}" for p in chosen.roles)
+    return Course(
+        name, problem, at, source, (*assumed, *(text for text in chosen.assumed if " is estimated" not in text), *said)
+    )
+
+
+def _moved_by(forces: Any, state: Array, epoch: Epoch, name: str, chosen: Chosen | None = None) -> Problem:
+    """A problem without measurements, its constants as they are assumed."""
+    chosen = chosen or chosen_forces(forces, state, name=name)
+    return _problem(chosen, {}, _numbers(chosen), epoch, state, np.zeros((6, 6)), name)
+
+
+def _numbers(chosen: Chosen) -> dict[str, float]:
+    """Constants as they are assumed, their uncertainty aside."""
+    return {p: float(np.ravel(v.mean if isinstance(v, Gaussian) else v)[0]) for p, v in chosen.values.items()}
+
+
+def _problem(
+    chosen: Chosen, roles: Mapping[str, str], values: Mapping[str, Any], epoch: Epoch, state: Array, P: Array, name: str
+) -> Problem:
+    return Problem(
+        chosen.forces.model((), roles), Gaussian(state, P), parameters=values,
+        integrator=RungeKutta8(max_step=chosen.max_step), functions=chosen.choice.functions(epoch), epoch=epoch,
+        prior_time=0.0, name=name,
+    )  # fmt: skip
+
+
+def _carrying(problem: Problem, step: float, first: Array, P: Array) -> Beliefs:
+    """By the forces of the problem from its epoch, forwards and backwards."""
+
+    def at(t: Array) -> tuple[Array, Array | None]:
+        x, covariance = np.empty((len(t), 6)), np.empty((len(t), 6, 6))
+        for side in (t >= 0.0, t < 0.0):
+            if side.any():
+                states, moved = carried_to(problem, step, 0.0, first, P, t[side])
+                x[side], covariance[side] = states[:, :6], moved[:, :6, :6]
+        return x, covariance
+
+    return at

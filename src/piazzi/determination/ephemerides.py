@@ -1,0 +1,266 @@
+"""`ephemeris`: where and when an orbit is seen from a station, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piazzi.determination.course import Course, course_of
+from piazzi.determination.looking import LIT, SAMPLES, Observer, observer, seen, where
+from piazzi.determination.passing import Instant, Passage, passages, span_of
+from piazzi.determination.words import seconds
+from piazzi.earth import Epoch, Station
+from piazzi.earth.stepping import longest_step
+from piazzi.evaluate.grids import Grid, as_html, as_rich
+from piazzi.evaluate.quantities import finite, number
+from piazzi.problem.checks import Array
+from piazzi.text import printable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import xarray
+    from rich.console import Console, ConsoleOptions
+
+SCHEMA = "piazzi.ephemeris/1"
+STEP = 60.0  # s
+MOST = 10**6  # rows
+UNITS = {
+    "right_ascension": "rad", "declination": "rad", "azimuth": "rad", "elevation": "rad", "range": "m", "range_rate": "m/s",
+    "frequency": "Hz", "rate": "rad/s", "position_angle": "rad", "sun_elevation": "rad", "moon_elevation": "rad", "shadow": "",
+    "ellipse_major": "rad", "ellipse_minor": "rad", "ellipse_position_angle": "rad", "along_track_sigma": "s",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Sky:
+    """What a station sees of an orbit.
+
+    Attributes
+    ----------
+    course, station : of what, from where
+    angles, axes : of right ascension and declination
+    t : (K,), s past `course.epoch`, at the reception
+    columns : by name (K,), SI and radians (`UNITS`); `shadow` is 0 in sunlight, 1 in half-shadow, 2 in full shadow
+    passes : above the mask of the station, where they were asked for
+    span : first and last instant that were looked at
+    """
+
+    course: Course
+    station: Station
+    angles: str
+    axes: str
+    t: Array
+    columns: Mapping[str, Array]
+    passes: tuple[Passage, ...] | None
+    span: tuple[Epoch, Epoch]
+
+    @property
+    def epochs(self) -> list[Epoch]:
+        """Of the rows."""
+        return [self.course.epoch + float(x) for x in self.t]
+
+    def __getitem__(self, name: str) -> Array:
+        return self.columns[name]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        columns = {
+            name: [LIT[int(v)] for v in values] if name == "shadow" else [finite(v) for v in values.tolist()]
+            for name, values in self.columns.items()
+        }
+        latitude, longitude, height = self.station.place(self.span[0])
+        return {
+            "schema": SCHEMA, "object": self.course.name, "source": self.course.source, "station": self.station.name,
+            "latitude": latitude, "longitude": longitude, "height": height, "angles": self.angles, "axes": self.axes,
+            "first": str(self.span[0]), "last": str(self.span[1]), "times": [str(epoch) for epoch in self.epochs],
+            "columns": columns, "units": {name: UNITS[name] for name in columns}, "assumed": list(self.course.assumed),
+            "passes": None if self.passes is None else [self._passed(one) for one in self.passes],
+        }  # fmt: skip
+
+    def _passed(self, one: Passage) -> dict[str, Any]:
+        return {
+            name: self._instant(at) for name, at in (("rise", one.rise), ("culmination", one.culmination), ("set", one.set))
+        }
+
+    def _instant(self, at: Instant | None) -> dict[str, Any] | None:
+        if at is None:
+            return None
+        return {"time": str(self.course.epoch + at.time), "azimuth": at.azimuth, "elevation": at.elevation}
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Columns over time, seconds of TT past the epoch in the attributes."""
+        import xarray as xr
+
+        facts = {key: value for key, value in self.to_dict().items() if isinstance(value, (str, float))}
+        variables = {name: ("time", values, {"units": UNITS[name]}) for name, values in self.columns.items()}
+        return xr.Dataset(variables, {"time": ("time", self.t, {"units": "s"})}, facts | {"epoch": self.course.epoch.exact()})
+
+    def write(self, path: Any) -> None:
+        """Write .csv, .nc or .cpf, whole or not at all."""
+        from piazzi.determination.sky_files import write
+
+        write(self, path)
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterable[Any]:
+        from rich.text import Text
+
+        yield Text(printable(self.heading))
+        yield from as_rich([self._grid()], [f"Assumed: {printable(text)}." for text in self.course.assumed], console, options)
+
+    def __str__(self) -> str:
+        from piazzi.evaluate.grids import as_text
+
+        return as_text(self)
+
+    def _repr_html_(self) -> str:
+        return as_html([self._grid()], [self.heading])
+
+    @property
+    def heading(self) -> str:
+        """What is seen from where, and what the directions are."""
+        on = "" if self.axes == "GCRF" else f" of {self.axes}"
+        return (
+            f"{self.course.name or 'the object'} from {self.station.name}: {self.angles} right ascension and declination{on}; "
+            f"azimuth and elevation without refraction; {self.span[0]} to {self.span[1]}"
+        )
+
+    def _grid(self) -> Grid:
+        return _passes_grid(self) if self.passes is not None else _rows_grid(self)
+
+
+def ephemeris(
+    orbit: Any,
+    station: Any,
+    when: Any = "tonight",
+    *,
+    step: Any = STEP,
+    passes: bool = False,
+    stations: Any = None,
+    mask: float | None = None,
+    frequency: float | None = None,
+    angles: str = "astrometric",
+    axes: str = "GCRF",
+    object: str | None = None,  # noqa: A002  # as everywhere
+    forces: Any = None,
+    now: Epoch | None = None,
+) -> Sky:
+    """Where and when an orbit is seen from a station, by the sensors that tracking is fitted with.
+
+    Rows are dated at the reception; range is the length of the signal's way down, range-rate its rate.
+
+    Parameters
+    ----------
+    orbit : a `Determination`, its JSON or .nc; a file (OEM, OPM, SP3, CPF, TLE, OMM); elements or a state as text
+    station : its name, an `earth.Station`, or ``"lat=50.1deg lon=8.6deg height=100m"``
+    when : "tonight" (the Sun 6 degrees down, from `now`), ``"A .. B"``, ``"A .. +6h"``, a date, or two of them
+    step : between rows, seconds or such as "30s"
+    passes : find passes above the mask; rows are their culminations
+    stations : files, lists, "ilrs" (the default)
+    mask : lowest elevation of passes, rad; default that of the station
+    frequency : that the satellite sends at, Hz
+    angles, axes : of right ascension and declination: "astrometric", "geocentric" or "apparent", and a frame
+    object : name, in a file of several
+    forces : of an orbit that is given by one state, as `determine` takes them; default by height
+    now : for "tonight"; default the clock
+
+    Raises
+    ------
+    ValueError
+        With what is wrong; also where the orbit is not known at some time.
+    OSError
+        Where a file cannot be read.
+    """
+    place = where(station, stations)
+    first, last = span_of(when, place, now=now)
+    width = seconds(step, "--step") if isinstance(step, str) else float(step)
+    if not width > 0.0:
+        raise ValueError(f"step is {width:g} s; it must be positive")
+    if frequency is not None and not 0.0 < frequency < np.inf:
+        raise ValueError(f"frequency is {frequency:g} Hz; it must be positive")
+    if not passes and (last - first) / width > MOST:
+        raise ValueError(f"--when with --step {width:g} s makes {(last - first) / width:,.0f} rows; at most {MOST:,} are made")
+    course = course_of(orbit, first, chosen=object, forces=forces)
+    begin, end = first - course.epoch, last - course.epoch
+    if passes and not end > begin:
+        raise ValueError(f"--when {when!r} is an instant; passes need a span")
+    course.check(np.array([begin, end]))
+    given = observer(course, place, angles=angles, axes=axes, frequency=frequency)
+    found = None
+    if passes:
+        looks = _looks(given, begin, end, width)
+        found = tuple(passages(given.mount_between(looks), looks, place.mask if mask is None else mask))
+        t = np.array([one.culmination.time for one in found])
+    else:
+        t = begin + width * np.arange(int((end - begin) / width + 1e-9) + 1)
+    return Sky(course, place, angles, axes, t, seen(given, t) if len(t) else {}, found, (first, last))
+
+
+def _looks(given: Observer, begin: float, end: float, width: float) -> Array:
+    """Times at which passes are looked for: as near to each other as the orbit is fast at its pericentre."""
+    r, v = np.split(given.course.beliefs(np.array([begin]))[0][0], 2)
+    step = min(width, longest_step(r, v, SAMPLES))
+    return np.linspace(begin, end, max(int(np.ceil((end - begin) / step)), 2) + 1)
+
+
+def _clock(epoch: Epoch) -> str:
+    return epoch.to("UTC").split()[0].split(".")[0].replace("T", " ")
+
+
+def _degrees(value: float) -> str:
+    return f"{np.degrees(value):.2f}"
+
+
+def _passes_grid(sky: Sky) -> Grid:
+    rows = []
+    for one in sky.passes or ():
+        cells = []
+        for at in (one.rise, one.culmination, one.set):
+            cells += ["-", "-"] if at is None else [_clock(sky.course.epoch + at.time), f"{np.degrees(at.azimuth):.1f}"]
+        i = int(np.argmin(np.abs(sky.t - one.culmination.time)))
+        lit = LIT[int(sky.columns["shadow"][i])]
+        rows.append((*cells, f"{np.degrees(one.culmination.elevation):.1f}", _degrees(sky.columns["sun_elevation"][i]), lit))
+    heads = (
+        "rise\n[UTC]",
+        "az\n[deg]",
+        "culmination\n[UTC]",
+        "az\n[deg]",
+        "set\n[UTC]",
+        "az\n[deg]",
+        "highest\n[deg]",
+        "Sun\n[deg]",
+        "",
+    )
+    return Grid(f"Passes: {len(rows)}", heads, tuple(rows))
+
+
+def _rows_grid(sky: Sky, most: int = 60) -> Grid:
+    c = sky.columns
+    heads = [
+        "time\n[UTC]",
+        "RA\n[deg]",
+        "Dec\n[deg]",
+        "az\n[deg]",
+        "el\n[deg]",
+        "range\n[km]",
+        "rate\n[km/s]",
+        "motion\n[arcsec/s]",
+    ]
+    heads += ["Sun\n[deg]", "", *(["3 sigma\n[arcsec]", "along\n[s]"] if "ellipse_major" in c else [])]
+    heads += ["frequency\n[Hz]"] if "frequency" in c else []
+    rows = []
+    for i in range(min(len(sky.t), most)):
+        cells = [_clock(sky.course.epoch + float(sky.t[i])), f"{np.degrees(c['right_ascension'][i]):.4f}"]
+        cells += [f"{np.degrees(c['declination'][i]):.4f}", _degrees(c["azimuth"][i]), _degrees(c["elevation"][i])]
+        cells += [f"{c['range'][i] / 1e3:.3f}", f"{c['range_rate'][i] / 1e3:.4f}", f"{np.degrees(c['rate'][i]) * 3600:.1f}"]
+        cells += [_degrees(c["sun_elevation"][i]), LIT[int(c["shadow"][i])]]
+        if "ellipse_major" in c:
+            axes = " x ".join(number(np.degrees(c[f"ellipse_{k}"][i]) * 3600, 2) for k in ("major", "minor"))
+            cells += [axes, number(c["along_track_sigma"][i], 2)]
+        cells += [f"{c['frequency'][i]:.1f}"] if "frequency" in c else []
+        rows.append(tuple(cells))
+    more = f", the first {most} of {len(sky.t):,}" if len(sky.t) > most else ""
+    return Grid(f"Ephemeris{more}", tuple(heads), tuple(rows))
