@@ -8,6 +8,7 @@ from tests.estimate.families import COUNT, FAMILIES, Reference
 from tests.laws.problems import satellite
 
 FAST = 3  # problems of each family in the fast test
+QUICK = ("pendulum", "cubic sensor")  # the others' kernels take up to eight seconds each
 CLOSE = 1e-6  # sigma
 
 
@@ -19,7 +20,7 @@ def check(family, seed):
     assert off <= CLOSE, (seed, off)
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in FAMILIES])
 def test_no_minimum_is_missed(name):
     """By more than a millionth of a sigma, with the process noise frozen at the solution."""
     for seed in range(FAST):

@@ -300,6 +300,7 @@ def test_the_filter_is_the_textbooks_with_these_steps(seen):
         assert_allclose(found.covariance[k], P, rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow  # kernels of 15 s; filter, live sessions and batch are in the tests around
 def test_all_estimators_take_them(seen):
     problem, tracking = seen
     ekf = pz.ExtendedKalmanFilter().estimate(problem, tracking)
@@ -344,6 +345,7 @@ def test_batch_finds_the_first_state():
     assert_allclose(found.mean[0], first, rtol=0, atol=2e-4)
 
 
+@pytest.mark.slow
 def test_lanes_change_no_bit(seen, monkeypatch):
     problem, tracking = seen
     found = {}

@@ -46,6 +46,7 @@ def permuted(order, states, dynamics, seen, q, r, prior, truth):
 
 
 ORDERS = [np.arange(10), np.arange(10)[::-1], np.random.default_rng(0).permutation(10)]
+NAMES = ["forward", "backward", "mixed"]
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,10 @@ def advection():
     return given, posterior(np.ones(n), [A] * (K - 1), [1e-6] * n, np.eye(n)[5:], [1e-4] * 5, K)
 
 
-@pytest.mark.parametrize("order", ORDERS, ids=["forward", "backward", "mixed"])
+@pytest.mark.parametrize(
+    "order",
+    [pytest.param(o, id=i, marks=() if i == "mixed" else pytest.mark.slow) for o, i in zip(ORDERS, NAMES, strict=True)],
+)
 @pytest.mark.parametrize(
     "estimator", [pz.Smoother(), pz.FactorGraph(), pz.SlidingWindow(lag=10)], ids=lambda e: type(e).__name__
 )

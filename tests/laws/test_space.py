@@ -154,6 +154,7 @@ def test_light_time_is_that_of_an_iteration_along_the_orbit():
     assert_allclose(H, slopes, rtol=1e-6, atol=1e-7)  # a kilometre of range is known to 1e-10 m
 
 
+@pytest.mark.slow  # kernels of 40 s; uncompiled, they are compared below
 @pytest.mark.parametrize("Q", [0.0, 1e-10])
 def test_all_estimators_find_the_orbit_and_agree(Q):
     problem, tracking = satellite(Q=Q), tracked(Q)
@@ -168,6 +169,7 @@ def test_all_estimators_find_the_orbit_and_agree(Q):
         assert np.abs((found.mean[-1] - graph.mean[-1]) / sigma).max() < 0.5
 
 
+@pytest.mark.slow
 def test_a_window_of_one_is_the_filter():
     problem, tracking = satellite(Q=1e-10), tracked(1e-10)
     window = pz.SlidingWindow(1, iterations=1).estimate(problem, tracking)
@@ -193,6 +195,7 @@ def close_by(Q=1e-10):
     return replace(satellite(Q=Q), prior=prior)
 
 
+@pytest.mark.slow
 def test_where_all_is_linear_the_graph_is_the_smoother():
     problem = close_by()
     tracking = pz.simulate(problem, np.arange(0.0, 3000.0, 30.0), np.random.default_rng(2))

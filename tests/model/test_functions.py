@@ -103,16 +103,16 @@ def problem(outside=True, sensors=(RADAR, DELAYED, QUADRATIC, TWO_WAY), use=("ra
 
 
 ALL = ("radar", "delayed", "quadratic", "two_way")
-ESTIMATORS = [
-    pz.ExtendedKalmanFilter(),
+QUICK = [pz.ExtendedKalmanFilter(), pz.FactorGraph()]  # the others take a kernel or two of ten seconds each
+OTHERS = [
     pz.UnscentedKalmanFilter(),
     pz.SquareRootKalmanFilter(),
     pz.Smoother(),
     pz.SlidingWindow(10),
-    pz.FactorGraph(),
     pz.BatchLeastSquares(),
     pz.FactorGraph(loss=pz.Huber(2.0)),
 ]
+ESTIMATORS = [*QUICK, *(pytest.param(e, marks=pytest.mark.slow) for e in OTHERS)]
 
 
 def differences(f, x, h=1e-6):
@@ -159,7 +159,7 @@ def test_two_legs_are_solved_one_after_the_other():
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=lambda e: f"{type(e).__name__}-{getattr(e, 'loss', '')}"[:40])
 def test_every_estimator_takes_functions_and_roots(estimator):
-    a, b = problem(), problem(outside=False)
+    a, b = problem(sensors=(RADAR, DELAYED)), problem(outside=False, sensors=(RADAR, DELAYED))
     tracking = pz.simulate(b, np.arange(0.0, 4.0, 0.1), np.random.default_rng(1))
     ours, twin = estimator.estimate(a, tracking), estimator.estimate(b, tracking)
     assert ours.success and twin.success
@@ -169,13 +169,14 @@ def test_every_estimator_takes_functions_and_roots(estimator):
 
 def test_simulations_are_the_same_with_a_function():
     times = np.arange(0.0, 2.0, 0.1)
-    a, b = (pz.simulate(p, times, np.random.default_rng(3)) for p in (problem(), problem(outside=False)))
+    sensors = (RADAR, DELAYED)
+    a, b = (pz.simulate(problem(outside, sensors), times, np.random.default_rng(3)) for outside in (True, False))
     np.testing.assert_allclose(a.truth, b.truth, rtol=1e-13)
     np.testing.assert_allclose(a.padded(2), b.padded(2), atol=1e-12)
 
 
 def test_a_live_filter_is_the_whole_run():
-    a = problem()
+    a = problem(sensors=(RADAR, DELAYED))
     tracking = pz.simulate(a, np.arange(0.0, 2.0, 0.1), np.random.default_rng(5))
     whole = pz.ExtendedKalmanFilter().estimate(a, tracking)
     live = pz.ExtendedKalmanFilter().start(a)
@@ -316,7 +317,7 @@ def test_a_model_shows_its_calls_and_roots(capsys):
 def test_runs_of_a_study_side_by_side_are_the_runs_one_by_one():
     times = np.arange(0.0, 2.0, 0.1)
     scaled = pz.ProcessNoise([0.0, 0.0, 1e-6, 1e-6], "second", "scaled")
-    p, rng = replace(problem(use=("delayed",)), process_noise=scaled), np.random.default_rng(4)
+    p, rng = replace(problem(sensors=(RADAR, DELAYED), use=("delayed",)), process_noise=scaled), np.random.default_rng(4)
     assert p.runs_in_ensemble
     layout = Layout(p, times)
     first = X + 0.05 * rng.standard_normal((11, 4))
