@@ -61,6 +61,7 @@ def noisy(given, seed, off=0.0):
     return replace(given, tracking=tracking, guess=guess)
 
 
+@pytest.mark.slow  # kernels of half a minute; that of fixes is quick
 def test_covariance_is_honest_over_seeds(given):
     runs, total = 12, 0.0
     for seed in range(runs):

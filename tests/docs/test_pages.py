@@ -22,7 +22,10 @@ finally:
 PAGES = sorted(p for p in DOCS.rglob("*.md") if any(b.language in ("python", "console") for b in blocks.blocks(p.read_text())))
 
 
-@pytest.mark.parametrize("page", [pytest.param(p, id=p.stem) for p in PAGES])
+SLOW = {"sensors"}  # kernels of half a minute
+
+
+@pytest.mark.parametrize("page", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in SLOW)) for p in PAGES])
 def test_the_code_of_a_page_runs_and_gives_what_the_page_says(page, tmp_path):
     blocks.run(page, tmp_path)
 

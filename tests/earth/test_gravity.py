@@ -168,7 +168,7 @@ def random_field(degree):
     return earth.GravityField("random", 3.986004415e14, R, c, s, "unknown", "test")
 
 
-@pytest.mark.parametrize("degree", [360, 720])
+@pytest.mark.parametrize("degree", [360, pytest.param(720, marks=pytest.mark.slow)])
 def test_high_degrees_stay_finite_and_harmonic_everywhere(degree):
     """Latitudes to a millimetre from a pole, at the surface and high above it; neighbours agree with the gradient."""
     gravity = earth.Gravity(random_field(degree), degree=degree)
