@@ -17,7 +17,8 @@ def test_the_call_and_the_command_take_what_the_table_has():
     taken = set(inspect.signature(pz.determine).parameters) - {"tracking", "announce", "notes", "conventions", "frame"}
     assert taken == {name for name, option in OPTIONS.items() if option.python}
     made = {p.name for p in command.params if isinstance(p, click.Option)} - {"help_all"}
-    assert made == {*OPTIONS, *(name.replace("-", "_") for name, *_ in _OPTIONS)}
+    of_command = {name for name, option in OPTIONS.items() if option.flags is not None}
+    assert made == {*of_command, *(name.replace("-", "_") for name, *_ in _OPTIONS)}
     assert {f.name for f in fields(Case)} == {*OPTIONS, "answers"}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import click
@@ -10,6 +10,7 @@ import click
 from piazzi.cli import options
 from piazzi.cli.options import F
 from piazzi.determination.case import OPTIONS, Case, Option
+from piazzi.determination.case_file import split
 
 USUAL = ("sigma", *(name for name, option in OPTIONS.items() if option.usual))
 
@@ -31,13 +32,15 @@ def case_options(function: F) -> F:
         "--help-all", is_flag=True, is_eager=True, expose_value=False, callback=_help_all, help="Show all options and exit."
     )(function)
     for name, option in reversed(list(OPTIONS.items())):
-        decorated = _option(name, option)(decorated)
+        decorated = decorated if option.flags is None else _option(name, option)(decorated)
     return decorated
 
 
-def said_case(words: Mapping[str, Any]) -> Case:
-    """The case that options give; raises ValueError for what cannot be."""
-    return Case.of({name: value for name, value in words.items() if value not in (None, (), False)}, "--{}")
+def said_case(files: Sequence[str], words: Mapping[str, Any]) -> tuple[tuple[str, ...], Case]:
+    """Files of tracking, and what a case among them and options say; raises ValueError for what cannot be, OSError."""
+    tracking, base = split(files)
+    given = {name: value for name, value in words.items() if value not in (None, (), False)}
+    return tuple(tracking), base.told(given, "--{}")
 
 
 def _option(name: str, option: Option) -> Any:

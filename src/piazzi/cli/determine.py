@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from piazzi.cli import output, results
+from piazzi.cli import options, output, results
 from piazzi.cli.case import WithCase, case_options, said_case
 from piazzi.cli.conventions import conventions
 from piazzi.cli.running import DONE, NOT_ESTIMATED, say
@@ -45,14 +45,16 @@ def command(files: tuple[str, ...], **given: Any) -> int:
 
     Exit status: 0 determined, 2 bad usage or input, 3 not determined.
     """
-    case = said_case(given)
+    read = files
+    files, case = said_case(files, given)
     if case.each and case.object:
         raise click.UsageError("--object and --each do not go together", click.get_current_context())
-    _check_outputs(case)
+    _check_outputs(case, read)
     if case.against is not None:
         from piazzi.formats import read_ephemeris
 
         read_ephemeris(case.against)  # what is wrong with it is said before the work
+    from piazzi.determination.case_text import write_case
     from piazzi.determination.determining import objects_in
 
     status = DONE
@@ -63,6 +65,9 @@ def command(files: tuple[str, ...], **given: Any) -> int:
             continue
         result = _one(files, own)
         wrote = _write(result, own)
+        if own.save is not None:
+            write_case(own.save, own, result.setup)
+            wrote.append(f"Wrote {own.save}")
         status = max(status, _status(result, case.strict))
         _print(result, case, wrote)
     return status
@@ -90,9 +95,12 @@ def _one(files: Sequence[str], case: Case) -> Determination:
     return replace(found, notes={**found.notes, "against": {"file": case.against, **difference}})
 
 
-def _check_outputs(case: Case) -> None:
+def _check_outputs(case: Case, files: Sequence[str]) -> None:
     """Refuse what could not be written, before anything is read."""
     from piazzi.determination.products import ENDINGS
+
+    for path in (*case.output, case.save):
+        options.check_places({"files": files, "output_file": path})
 
     for path in case.output:
         if path == output.STDOUT:
@@ -103,6 +111,10 @@ def _check_outputs(case: Case) -> None:
     doubled = [path for i, path in enumerate(case.output) if path in case.output[:i]]
     if doubled:
         raise click.UsageError(f"-o {doubled[0]} is given twice", click.get_current_context())
+    if case.save is not None:
+        if case.each:
+            raise click.UsageError("--save and --each do not go together", click.get_current_context())
+        output.check_output(case.save, (".toml",), "--save")
     results.check_report(case.report)
 
 

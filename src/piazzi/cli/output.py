@@ -57,7 +57,7 @@ def _stdout() -> Any:
     return sys.stdout
 
 
-def check_output(path: str | None, endings: Sequence[str]) -> None:
+def check_output(path: str | None, endings: Sequence[str], option: str = "-o") -> None:
     """Refuse a file that could not be written, before anything is computed; "-" and None are always fine.
 
     Raises
@@ -70,7 +70,9 @@ def check_output(path: str | None, endings: Sequence[str]) -> None:
     if path is None or path == STDOUT:
         return
     if Path(path).suffix.lower() not in endings:
-        raise click.UsageError(f"-o {path}: the file must end in {', '.join(endings)}", click.get_current_context(silent=True))
+        raise click.UsageError(
+            f"{option} {path}: the file must end in {', '.join(endings)}", click.get_current_context(silent=True)
+        )
     check_place(path)
 
 

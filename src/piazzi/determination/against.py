@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.products import arc_of, dates_of
+from piazzi.determination.arcs import arc_of, dates_of
 from piazzi.formats import Ephemeris, read_ephemeris
 from piazzi.orbit import Difference, difference
 

@@ -14,9 +14,7 @@ from math import ceil, pi
 import numpy as np
 
 from piazzi.determination.analysis import analysed
-from piazzi.determination.guesses import MU
 from piazzi.determination.setup import Setup, follow, scale_of, with_prior
-from piazzi.earth.stepping import turning
 from piazzi.evaluate.information import factor
 from piazzi.orbit import ModifiedEquinoctial
 from piazzi.problem.checks import Array
@@ -55,7 +53,7 @@ def approached(given: Setup) -> Setup:
     before = first
     away = np.abs(given.tracking.row_times - begun)
     there = np.isfinite(given.tracking.values)
-    half = pi / turning(first[:3], first[3:6])
+    half = pi / given.measured.centre.turning(first[:3], first[3:6])
     while True:
         rows = away <= half
         whole = bool(rows.all())
@@ -93,10 +91,7 @@ def _place(given: Setup, begun: float, first: Array) -> Place | None:
         back, Phi = follow(given.problem, nodes, first, step)
         states = follow(given.problem, times, back[-1], step)[0]
         found = analysed(given, states)
-        kind = ModifiedEquinoctial()
-        elements = kind.from_state(first[:3], first[3:6], MU)
-        change = np.eye(len(first))
-        change[:6, :6] = kind.jacobian_to_state(elements, MU)
+        change = _change(first, given.measured.centre.mu)
     except ValueError:
         return None
     for one in Phi:
@@ -107,11 +102,11 @@ def _place(given: Setup, begun: float, first: Array) -> Place | None:
     return Place(first, states, found.whitened, found.rows @ change)
 
 
-def _moved(first: Array, step: Array) -> Array:
+def _moved(first: Array, step: Array, mu: float) -> Array:
     """The state after a step in elements and constants; raises ValueError where that is no orbit."""
     kind = ModifiedEquinoctial()
-    elements = kind.from_state(first[:3], first[3:6], MU) + step[:6]
-    r, v = kind.to_state(elements, MU)
+    elements = kind.from_state(first[:3], first[3:6], mu) + step[:6]
+    r, v = kind.to_state(elements, mu)
     return np.concatenate([r, v, first[6:] + step[6:]])
 
 
@@ -144,7 +139,8 @@ def _tried(
     w, J = here.whitened[rows].reshape(-1), here.rows[rows].reshape(-1, len(unit))
     there = np.isfinite(w)
     weight = 1.0 / np.sqrt(1.0 + (w[there] / scale) ** 2)
-    T = _change(here.first)
+    mu = given.measured.centre.mu
+    T = _change(here.first, mu)
     own = T / unit[:, None]  # of the prior, by elements and constants
     A = np.vstack([weight[:, None] * J[there], own])
     b = np.concatenate([weight * w[there], (before - here.first) / unit])
@@ -153,15 +149,16 @@ def _tried(
     A = np.vstack([A / size, np.sqrt(damping) * np.eye(len(unit))])
     step = np.linalg.lstsq(A, np.append(b, np.zeros(len(unit))), rcond=None)[0] / size
     try:
-        return _place(given, begun, _moved(here.first, step))
+        return _place(given, begun, _moved(here.first, step, mu))
     except ValueError:
         return None
 
 
-def _change(first: Array) -> Array:
+def _change(first: Array, mu: float) -> Array:
+    """Derivative (n, n) of a state and constants by elements and constants."""
     kind = ModifiedEquinoctial()
     out = np.eye(len(first))
-    out[:6, :6] = kind.jacobian_to_state(kind.from_state(first[:3], first[3:6], MU), MU)
+    out[:6, :6] = kind.jacobian_to_state(kind.from_state(first[:3], first[3:6], mu), mu)
     return out
 
 

@@ -29,10 +29,11 @@ class Option:
     many : whether it may be given several times
     usual : whether ``--help`` shows it, or ``--help-all`` alone
     file : whether it may name a file, which is looked for beside the case first
-    flags : as the command line writes it; default ``--name``
+    flags : as the command line writes it; default ``--name``, None for what only a case says
     section : of a case, where its key may stand too, and that key
     choices : of text, where there are but these
     python : whether `determine` takes it; the others are the command's
+    key : whether a case may have it
     """
 
     metavar: str
@@ -41,10 +42,11 @@ class Option:
     many: bool = False
     usual: bool = False
     file: bool = False
-    flags: tuple[str, ...] = ()
+    flags: tuple[str, ...] | None = ()
     section: tuple[str, str] | None = None
     choices: tuple[str, ...] = ()
     python: bool = True
+    key: bool = True
 
 
 def said(default: Any, metavar: str, text: str, reader: Callable[[Any, str], Any] = read.anything, **rest: Any) -> Any:
@@ -55,6 +57,11 @@ def said(default: Any, metavar: str, text: str, reader: Callable[[Any, str], Any
 def asked(default: Any, metavar: str, text: str, reader: Callable[[Any, str], Any] = read.anything, **rest: Any) -> Any:
     """The same for an option that the command alone has."""
     return said(default, metavar, text, reader, python=False, **rest)
+
+
+def keyed(section: str, key: str, reader: Callable[[Any, str], Any] = read.text) -> Any:
+    """The same for what only a section of a case says."""
+    return asked(None, "", "", reader, flags=None, section=(section, key))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,18 +101,33 @@ class Case:
     epoch: Any = said(None, "DATE", "Where the answer stands.  [default: the last measurement used]", read.instant)
     span: Any = asked(None, "'A .. B'", 'Of products, as "first .. last+3d".', read.span)
     step: float | None = asked(
-        None, "TIME", "Between states of products.  [default: 60s]", read.duration, section=("product", "step")
+        None,
+        "TIME",
+        "Between states of products.  [default: 60s, about the Sun a day]",
+        read.duration,
+        section=("product", "step"),
     )
     covariance: str = asked(
         "scaled", "KIND", "Covariances that the verdict calls too small: scaled, as the file says then, or formal.  "
         "[default: scaled]", choices=("scaled", "formal"),
     )  # fmt: skip
+    about: str | None = said(
+        None, "CENTRE", "What it goes about: earth or sun.  [default: what the measurements fit]", choices=("earth", "sun")
+    )
     object: str | None = said(None, "NAME", "Which object, in files of several.", section=("object", "name"))
     each: bool = asked(False, "", "Every object, one after the other; products by {object}.", read.flag)
     against: Any = asked(None, "FILE", "Compare with another orbit, at its rows within the span.", file=True)
     strict: bool = asked(False, "", "Exit 3 where any sentence of the verdict is false.", read.flag)
     anyway: bool = asked(False, "", "Write products of an orbit that is not determined too.", read.flag)
     show: bool = asked(False, "", "Show forces, unknowns, noise and assumptions, and stop.", read.flag)
+    save: str | None = asked(None, "CASE", "Write a case (.toml) with all that was assumed filled in.", key=False)
+    identifier: str | None = keyed("object", "id")
+    norad: int | None = keyed("object", "norad", read.catalogue)
+    antenna: tuple[float, float, float] | None = keyed("object", "antenna", read.vector)
+    originator: str | None = keyed("product", "originator")
+    axes: str | None = keyed("product", "frame", read.axes)
+    covariance_step: float | None = keyed("product", "covariance_step", read.duration)
+    interpolation: tuple[str, int] | None = keyed("product", "interpolation", read.interpolation)
     answers: Mapping[str, Any] = field(default_factory=dict)  # by the names of ANSWERS
 
     @classmethod

@@ -59,7 +59,7 @@ def instant(value: Any, where: str) -> Any:
 
 def span(value: Any, where: str) -> Any:
     """Two ends with .. between them."""
-    from piazzi.determination.products import check_span
+    from piazzi.determination.arcs import check_span
 
     check_span(value)
     return value
@@ -90,6 +90,45 @@ def uncertain(value: Any, where: str) -> Any:
 
     considered(value)
     return value
+
+
+def text(value: Any, where: str) -> str:
+    """Text that is not empty."""
+    if not isinstance(value, str) or not value.strip():
+        raise ValueError(f"{where} is {one_line(repr(value), 60)}; it must be text")
+    return value.strip()
+
+
+def catalogue(value: Any, where: str) -> int:
+    """A number of the catalogue of space objects."""
+    found = str(value).strip()
+    if isinstance(value, bool) or not found.isdecimal() or not found.isascii() or not 0 < int(found) < 10**9:
+        raise ValueError(f"{where} is {one_line(repr(value), 60)}; it is a whole number of at most nine digits, such as 22195")
+    return int(found)
+
+
+def vector(value: Any, where: str) -> tuple[float, float, float]:
+    """Three finite numbers."""
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise ValueError(f"{where} is {one_line(repr(value), 60)}; it must be three numbers, m along R, T and N")
+    x, y, z = (number(one, where) for one in value)
+    return x, y, z
+
+
+METHODS = {"HERMITE": 7, "LAGRANGE": 9, "LINEAR": 1}  # with their usual degrees
+
+
+def interpolation(value: Any, where: str) -> tuple[str, int]:
+    """A method of interpolation with its degree, as ``"Lagrange 9"``."""
+    if isinstance(value, tuple):
+        return str(value[0]), int(value[1])
+    method, _, degree = str(value).strip().upper().partition(" ")
+    plain = degree.strip() or str(METHODS.get(method, ""))
+    if method not in METHODS or not plain.isdecimal() or not 0 < int(plain) < 100:
+        raise ValueError(
+            f"{where} is {one_line(repr(value), 60)}; write Hermite, Lagrange or Linear, and a degree: 'Lagrange 9'"
+        )
+    return method, int(plain)
 
 
 def axes(value: Any, where: str) -> str:

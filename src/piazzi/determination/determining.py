@@ -15,6 +15,7 @@ from piazzi.determination.analysis import Analysis, analysed
 from piazzi.determination.approach import approached
 from piazzi.determination.burns import burns_of
 from piazzi.determination.case import Case
+from piazzi.determination.case_file import split
 from piazzi.determination.editing import edited
 from piazzi.determination.fit import estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
@@ -23,7 +24,8 @@ from piazzi.determination.orbit_forces import Chosen, chosen_forces
 from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.determination.setup import Setup, posed, setup
-from piazzi.determination.unguided import unguided
+from piazzi.determination.sun_forces import forces_about_the_sun
+from piazzi.determination.unguided import goes_about_the_sun, unguided
 from piazzi.determination.unknowns import BIAS, CLOCK, SCALE, asked
 from piazzi.determination.verdict import verdict
 from piazzi.earth import Epoch
@@ -43,15 +45,16 @@ def determine(
     guess: Any = None,
     stations: Any = None,
     with_: Any = None,
-    forces: Any = "default",
-    estimate: Any = (),
-    consider: Any = (),
+    forces: Any = None,
+    estimate: Any = None,
+    consider: Any = None,
     manoeuvre: Any = (),
     mass: float | None = None,
     area: float | None = None,
     com: float | None = None,
     epoch: Any = None,
     frame: str | None = None,
+    about: str | None = None,
     object: str | None = None,  # noqa: A002  # as everywhere
     announce: Callable[[str], None] | None = None,
     notes: Mapping[str, Any] | None = None,
@@ -61,19 +64,21 @@ def determine(
 
     Parameters
     ----------
-    tracking : files, or `Observations`, put together
+    tracking : files, or `Observations`, put together; a file ``.toml`` among them is a case, which the words override
     guess : where to begin: text, ``"a=7078km e=0.001 i=98.2deg raan=10deg argp=0deg nu=0deg epoch=2026-11-03T04:12:00Z"``
         or ``"x=7000km ... vz=7.5km/s epoch=..."``; a file (OEM, OPM, TLE, OMM, SP3, CPF, an earlier determination's JSON); a
         `Guess`.  None, or "none": all orbits that fit are looked for.
     stations : files, `earth.Station` objects or a `StationList`; "ilrs" are those of the package
     with_ : estimators, as the command line writes them; the first is the answer.  Default the graph.
-    forces : "default" (by height), "none", text such as ``"gravity=EGM2008 degree=40 drag=exponential"``, or `earth.Forces`
+    forces : "default" (by height, as without it), "none", text such as ``"gravity=EGM2008 degree=40 drag=exponential"``, or
+        `earth.Forces`
     estimate : further unknowns, as text such as ``"cd/12h cr bias.range.7090/pass=1m clock.BER=1ms"``, or `pz.Estimated`
     consider : constants that are uncertain, ``{"cr": 0.1}``, or text ``"cr=0.1"``
     manoeuvre : text such as ``"2026-11-03T04:12:00Z dv=0,0.3,0m/s axes=RTN sigma=0.05m/s for=600s"``, files (CSV, OPM, OCM)
     mass, area, com : kg, m2; and what a range is shorter by than to the centre of mass, m
     epoch : where the answer stands; default the last measurement
-    frame : axes of the answer, default GCRF; and of fixes whose file does not say them
+    frame : axes of the answer, default GCRF, about the Sun ICRF; and of fixes whose file does not say them
+    about : "earth" or "sun"; default the Sun where directions fit no orbit about the Earth
     object : name of what to determine, in files of several
     announce : called with the name of each step as it begins
     notes : kept in the result: the command
@@ -87,7 +92,8 @@ def determine(
         For what is wrong with the input or open, with the option that says it.
     """
     words = {name: value for name, value in locals().items() if name not in ("tracking", "announce", "notes", "conventions")}
-    return determined(tracking, Case.of({**words, **conventions}), announce, notes)
+    files, case = split(tracking)
+    return determined(files, case.told({**words, **conventions}), announce, notes)
 
 
 def determined(
@@ -100,29 +106,52 @@ def determined(
     say = announce or (lambda step: None)
     chosen = estimators(case.with_)
     scale, _ = _instant(case.epoch)
-    axes = frame_named(case.frame) if case.frame else "GCRF"
+    axes = frame_named(case.frame) if case.frame else None
     say("reading")
     given = prepared(*tracking, case=case)
     say("approaching")
-    return solved(approached(given), chosen, axes, scale, say, notes or {})
+    centre = given.measured.centre
+    return solved(approached(given), chosen, axes or centre.frame, scale or centre.scale, say, notes or {}, case)
 
 
 def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
     """The problem and tracking that `determine` solves, of a case or of the same words; raises as it does."""
-    case = Case.of(words) if case is None else case
+    files, told = split(tracking)
+    case = told.told(words) if case is None else case
     _, at = _instant(case.epoch)
     wanted, burns = asked(case.estimate, case.consider), burns_of(case.manoeuvre)
-    rows = of_object(_observations(tracking, case.answers), case.object)
-    clocks = any(one.what.kind == CLOCK for one in wanted)
-    seen = measured(rows, case.stations, com=case.com, corrections=case.answers.get("corrections"), clocks=clocks)
+    rows = of_object(_observations(files, case.answers), case.object)
+    seen, begin = _seen(rows, case, any(one.what.kind == CLOCK for one in wanted))
     seen = with_instruments(seen, [one for one in wanted if one.what.kind in INSTRUMENTS])
 
     def chosen(orbit: Guess) -> Chosen:
-        found = chosen_forces(case.forces, orbit.state, name=seen.object, mass=case.mass, area=case.area)
+        if seen.about == "sun":
+            found = forces_about_the_sun(case.forces, orbit.state)
+        else:
+            found = chosen_forces(case.forces, orbit.state, name=seen.object, mass=case.mass, area=case.area)
         return with_unknowns(found, wanted, burns, seen)
 
-    begin = _guess(case.guess, seen, case.object) or unguided(seen, lambda first: posed(seen, chosen(first), first))
+    begin = begin or unguided(seen, lambda first: posed(seen, chosen(first), first))
     return setup(seen, chosen(begin), begin, at=at)
+
+
+def _seen(rows: Observations, case: Case, clocks: bool) -> tuple[Measured, Guess | None]:
+    """What was measured, by the centre that the user, the guess or the measurements say; and the guess where there is one."""
+
+    def by(about: str) -> Measured:
+        corrections = case.answers.get("corrections")
+        return measured(
+            rows, case.stations, com=case.com, corrections=corrections, clocks=clocks, name=case.object, about=about
+        )
+
+    seen = by(case.about or "earth")
+    begin = _guess(case.guess, seen, case.object)
+    about = begin.about if begin is not None else seen.about
+    if case.about is None and begin is None and goes_about_the_sun(seen):
+        about = "sun"
+    if case.about not in (None, about):
+        raise ValueError(f"--about {case.about}: the guess is about the {about.title()}")
+    return (seen if about == seen.about else by(about)), begin
 
 
 def objects_in(tracking: Sequence[Any], case: Case) -> list[str | None]:
@@ -137,6 +166,7 @@ def solved(
     scale: str = "UTC",
     announce: Callable[[str], None] = lambda step: None,
     notes: Mapping[str, Any] | None = None,
+    case: Case | None = None,
 ) -> Determination:
     """The determination of a problem by estimators, of which the first is the answer."""
     found: dict[str, Estimate] = {}
@@ -150,7 +180,10 @@ def solved(
     seconds = time.perf_counter() - started
     announce("testing")
     sentences = verdict(given, answer, found, analysis, keep, reasons)
-    return Determination(given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}))
+    case = Case() if case is None else case
+    return Determination(
+        given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}), case
+    )
 
 
 def _answered(given: Setup, estimator: Estimator) -> tuple[Array, Array, Estimate, Analysis | None]:
@@ -193,18 +226,17 @@ def _observations(tracking: Sequence[Any], told: Mapping[str, Any]) -> Observati
     return concatenate([*([read_tracking(*paths, **told)] if paths else []), *ready])
 
 
-def _instant(epoch: Any) -> tuple[str, Epoch | None]:
-    """The scale to tell dates in, and where the answer stands."""
+def _instant(epoch: Any) -> tuple[str | None, Epoch | None]:
+    """The scale to tell dates in, where it is said, and where the answer stands."""
     if epoch is None:
-        return "UTC", None
-    scale = read_date(epoch).scale if isinstance(epoch, str) else "UTC"
-    return scale, Epoch(epoch)
+        return None, None
+    return read_date(epoch).scale if isinstance(epoch, str) else None, Epoch(epoch)
 
 
 def _guess(given: Any, seen: Measured, chosen: str | None) -> Guess | None:
     """The user's, or what fixes give by themselves; None where there is neither."""
     if given is not None and given != "none":
-        return guess_of(given, seen.first, chosen or seen.object or None)
+        return guess_of(given, seen.first, chosen or seen.object or None, seen.about)
     wide = {s.name for s in seen.stations if s.sensor in ("position", "position_velocity")}
     own = np.isin(seen.tracking.row_stations, list(wide)) & np.isfinite(seen.tracking.values[:, :3]).all(axis=1) if wide else []
     return from_fixes(seen.epoch, seen.tracking.row_times[own], seen.tracking.values[own, :3]) if np.any(own) else None

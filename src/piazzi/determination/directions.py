@@ -11,11 +11,12 @@ import numpy as np
 from piazzi.determination.parts import Part
 from piazzi.determination.ranging import EVENTS, passes
 from piazzi.determination.sites import Context, weather_of
-from piazzi.earth import sensors
+from piazzi.earth import Place, sensors
 from piazzi.earth.rotation import frame_named
 from piazzi.formats import TAGS
 from piazzi.problem.checks import Array
 
+GEOCENTRE = "500"  # of the Minor Planet Center: reduced to the centre of the Earth
 AZEL, RADEC = ("azimuth", "elevation"), ("right_ascension", "declination")
 
 
@@ -36,9 +37,12 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
     segment = observations.segments[observations.segment[first]]
     if observations.place[index].max() >= 0:
         raise ValueError(f"{context.where}directions from observers that move are not determined from yet")
-    site = context.site(int(observations.station[first]))
+    number = int(observations.station[first])
+    site = None if number >= 0 and observations.participants[number] == GEOCENTRE else context.site(number)
     tag = EVENTS[TAGS[observations.tag[first]] or segment.tag or "bounce"]
     if kinds == AZEL:
+        if site is None or context.about == "sun":
+            raise ValueError(f"{context.where}azimuths and elevations are of stations, of an orbit about the Earth")
         bent = "radio" if context.open else None
         if not context.open:
             context.said["azimuths and elevations are free of refraction (--corrections open says otherwise)"] = None
@@ -46,9 +50,13 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
     else:
         if segment.angles is None:
             raise ValueError(f"{context.where}what are the directions? --angles astrometric, geocentric or apparent")
-        sensor = _ascension(segment.angles, frame_named(segment.frame or "GCRF"), tag, context.clocks)
-    weather = weather_of(observations, index, site, context.epoch)[0]
-    given = sensor.at(site, context.epoch, 1.0, weather=weather)
+        sensor = _ascension(segment.angles, frame_named(segment.frame or "GCRF"), tag, context.clocks, context.about)
+    if site is None or context.about == "sun":
+        place = Place(site, context.epoch, about=context.about)
+        given = sensor.at(None, context.epoch, 1.0, name=GEOCENTRE if site is None else site.name, place=place)
+    else:
+        weather = weather_of(observations, index, site, context.epoch)[0]
+        given = sensor.at(site, context.epoch, 1.0, weather=weather)
     there = rows >= 0
     values = np.where(there, observations.value[rows], np.nan)
     sigma = np.where(there, observations.sigma[rows], np.nan)
@@ -59,7 +67,9 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
     correlation = np.where(both, np.nan_to_num(observations.correlation[rows[:, 1]]), 0.0)
     noise[:, 0, 1] = noise[:, 1, 0] = correlation * sigma[:, 0] * sigma[:, 1]
     t = observations.t[rows.max(axis=1)]
-    return Part(sensor, site.name, t, values, noise, rows, given["place"], given["numbers"], sensor.functions(context.epoch))
+    return Part(
+        sensor, given["name"], t, values, noise, rows, given["place"], given["numbers"], sensor.functions(context.epoch)
+    )
 
 
 def paired(context: Context, index: Array, kinds: tuple[str, ...]) -> Array:
@@ -83,6 +93,6 @@ def _azimuth(tag: str, bent: str | None, clocks: bool) -> Any:
 
 
 @lru_cache(maxsize=64)
-def _ascension(angles: str, axes: str, tag: str, clocks: bool) -> Any:
-    name = "_".join(["right_ascension", angles, axes.lower(), tag])
-    return sensors.right_ascension_declination(angles, name=name, axes=axes, tag=tag, time_bias=clocks)
+def _ascension(angles: str, axes: str, tag: str, clocks: bool, about: str) -> Any:
+    name = "_".join(["right_ascension", angles, axes.lower(), tag, *([about] if about != "earth" else [])])
+    return sensors.right_ascension_declination(angles, name=name, axes=axes, tag=tag, time_bias=clocks, about=about)

@@ -27,6 +27,7 @@ def document(found: Any) -> dict[str, Any]:
         "object": found.object,
         "epoch": found.epoch.to(found.scale),
         "frame": found.frame,
+        "about": found.setup.measured.about,
         "names": list(model.names),
         "units": [model.unit(name) for name in model.names],
         "mean": _listed(mean),

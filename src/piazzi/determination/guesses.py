@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination.centres import centre_of
 from piazzi.determination.words import date, pairs, quantity
 from piazzi.earth import Epoch, transform
-from piazzi.earth.constants import GM
 from piazzi.earth.rotation import frame_named
 from piazzi.formats import Arc, Ephemeris, read_ephemeris
 from piazzi.formats.ephemeris import MeanElements
@@ -22,21 +22,20 @@ from piazzi.orbit import Keplerian, orbit_axes, sgp4_states
 from piazzi.orbit.interpolation import interpolated
 from piazzi.problem.checks import Array
 
-MU = GM["earth"]
 SCHEMA = "piazzi.determine/1"
 ELEMENTS = ("a", "e", "i", "raan", "argp")
 ANOMALIES = {"nu": "true", "E": "eccentric", "M": "mean"}
 CARTESIAN = {"x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s"}
 EXAMPLE = "a=7078km e=0.001 i=98.2deg raan=10deg argp=0deg nu=0deg epoch=2026-11-03T04:12:00Z frame=GCRF"
 LARGEST = 2**24  # bytes of an earlier determination
-NEAREST, FARTHEST = 1e6, 2e9  # m: distances from the centre that an orbit of the Earth may have
 
 
 @dataclass(frozen=True, eq=False)
 class Guess:
     """A state to begin from: position (3,) m and velocity (3,) m/s on the axes of the GCRF at an instant.
 
-    `source` says where it came from, `assumed` what was taken where nothing was said, `orbits` what else fits.
+    `source` says where it came from, `assumed` what was taken where nothing was said, `orbits` what else fits, `about` what it
+    goes about.
     """
 
     epoch: Epoch
@@ -45,6 +44,7 @@ class Guess:
     source: str
     assumed: tuple[str, ...] = ()
     orbits: Any = None
+    about: str = "earth"
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity"):
@@ -54,15 +54,17 @@ class Guess:
             values.setflags(write=False)
             object.__setattr__(self, name, values)
         distance = float(np.linalg.norm(self.position))
-        if not NEAREST < distance < FARTHEST:
+        centre = centre_of(self.about)
+        if not centre.nearest < distance < centre.farthest:
             raise ValueError(
-                f"{self.source}: it is {distance / 1e3:,.0f} km from the centre of the Earth, which is no orbit about it"
+                f"{self.source}: it is {distance / 1e3:,.0f} km from the centre of the {self.about.title()}, "
+                "which is no orbit about it"
             )
         if float(np.linalg.norm(np.cross(self.position, self.velocity))) < 1e-3 * distance:
-            raise ValueError(f"{self.source}: it moves along a straight line through the centre of the Earth")
+            raise ValueError(f"{self.source}: it moves along a straight line through the centre of the {self.about.title()}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.epoch, self.position, self.velocity, self.source, self.assumed, self.orbits)
+        return type(self), (self.epoch, self.position, self.velocity, self.source, self.assumed, self.orbits, self.about)
 
     @property
     def state(self) -> Array:
@@ -70,7 +72,7 @@ class Guess:
         return np.concatenate([self.position, self.velocity])
 
 
-def guess_of(given: Any, near: Epoch, chosen: str | None = None) -> Guess:
+def guess_of(given: Any, near: Epoch, chosen: str | None = None, about: str = "earth") -> Guess:
     """The guess that a user gives: text, a path, a `Guess`, an ephemeris, or what has a ``to_dict`` of a determination.
 
     Parameters
@@ -78,6 +80,7 @@ def guess_of(given: Any, near: Epoch, chosen: str | None = None) -> Guess:
     given : see above
     near : the first measurement; of a file with many states the one there, or the nearest
     chosen : name of the object in a file of several
+    about : what elements and states of text are about
 
     Raises
     ------
@@ -93,12 +96,12 @@ def guess_of(given: Any, near: Epoch, chosen: str | None = None) -> Guess:
     if isinstance(given, Mapping):
         return _of_determination(given, "guess")
     if isinstance(given, (Ephemeris, Arc, MeanElements)):
-        return _of_orbit(given, near, chosen, "guess")
+        return _of_orbit(given, near, chosen, "guess", about)
     text = os.fspath(given)
-    return _of_text(text) if "=" in text and not os.path.exists(text) else _of_file(text, near, chosen)
+    return _of_text(text, about) if "=" in text and not os.path.exists(text) else _of_file(text, near, chosen, about)
 
 
-def _of_text(text: str) -> Guess:
+def _of_text(text: str, about: str) -> Guess:
     known = (*ELEMENTS, *ANOMALIES, *CARTESIAN, "epoch", "frame")
     found = pairs(text, "--guess", known, f'"{EXAMPLE}"')
     cartesian, elements = [n for n in CARTESIAN if n in found], [n for n in (*ELEMENTS, *ANOMALIES) if n in found]
@@ -113,13 +116,13 @@ def _of_text(text: str) -> Guess:
         values = np.array([quantity(found[n], unit, f"--guess: {n}") for n, unit in CARTESIAN.items()])
         r, v = values[:3], values[3:]
     else:
-        r, v = _of_elements(found)
-    assumed = () if "frame" in found else ("the guess is in the GCRF (frame=...)",)
+        r, v = _of_elements(found, centre_of(about).mu)
+    assumed = () if "frame" in found else (f"the guess is in the {centre_of(about).frame} (frame=...)",)
     r, turned = transform(r, v, frame, "GCRF", epoch)
-    return Guess(epoch, r, np.asarray(turned), "--guess", assumed)
+    return Guess(epoch, r, np.asarray(turned), "--guess", assumed, about=about)
 
 
-def _of_elements(found: Mapping[str, str]) -> tuple[Array, Array]:
+def _of_elements(found: Mapping[str, str], mu: float) -> tuple[Array, Array]:
     _complete([n for n in ELEMENTS if n in found], ELEMENTS)
     anomalies = [n for n in ANOMALIES if n in found]
     if len(anomalies) != 1:
@@ -127,7 +130,7 @@ def _of_elements(found: Mapping[str, str]) -> tuple[Array, Array]:
     units = ("m", "", "deg", "deg", "deg", "deg")
     values = [quantity(found[n], u, f"--guess: {n}") for n, u in zip((*ELEMENTS, anomalies[0]), units, strict=True)]
     try:
-        return Keplerian(anomaly=ANOMALIES[anomalies[0]]).to_state(np.array(values), MU)
+        return Keplerian(anomaly=ANOMALIES[anomalies[0]]).to_state(np.array(values), mu)
     except ValueError as error:
         raise ValueError(f"--guess is no orbit: {error}") from None
 
@@ -138,12 +141,12 @@ def _complete(have: list[str], wanted: tuple[str, ...]) -> None:
         raise ValueError(f'--guess has no {", ".join(missing)}: write such as "{EXAMPLE}"')
 
 
-def _of_file(path: str, near: Epoch, chosen: str | None) -> Guess:
+def _of_file(path: str, near: Epoch, chosen: str | None, about: str) -> Guess:
     with opened(path) as file:
         start = file.read(512)
         if start.lstrip().startswith(b"{"):
             return _of_determination(_json(start + file.read(LARGEST), path), path)
-    return _of_orbit(read_ephemeris(path), near, chosen, path)
+    return _of_orbit(read_ephemeris(path), near, chosen, path, about)
 
 
 def _json(content: bytes, path: str) -> Mapping[str, Any]:
@@ -169,10 +172,10 @@ def _of_determination(found: Mapping[str, Any], path: str) -> Guess:
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise ValueError(f"{path}: the determination has no state: {one_error(error)}") from None
     r, v = transform(mean[:3], mean[3:], frame, "GCRF", epoch)
-    return Guess(epoch, r, np.asarray(v), path)
+    return Guess(epoch, r, np.asarray(v), path, about=str(found.get("about", "earth")))
 
 
-def _of_orbit(orbit: Any, near: Epoch, chosen: str | None, path: str) -> Guess:
+def _of_orbit(orbit: Any, near: Epoch, chosen: str | None, path: str, about: str) -> Guess:
     if isinstance(orbit, MeanElements):
         return _of_mean(orbit, near, path)
     arcs: tuple[Arc, ...] = (orbit,) if isinstance(orbit, Arc) else _arcs(orbit, chosen, path)
@@ -180,8 +183,8 @@ def _of_orbit(orbit: Any, near: Epoch, chosen: str | None, path: str) -> Guess:
         mean = [m for m in orbit.mean if chosen in (None, m.name, m.identifier)]
         return _of_mean(min(mean, key=lambda m: abs(m.epoch - near)), near, path)
     arc = min(arcs, key=lambda one: _away(one, near))
-    if arc.centre not in (None, "EARTH"):
-        raise ValueError(f"{path}: positions of {arc.name or 'the object'} are about {arc.centre}, not the Earth")
+    if arc.centre not in (None, about.upper()):
+        raise ValueError(f"{path}: positions of {arc.name or 'the object'} are about {arc.centre}, not the {about.title()}")
     if arc.frame is None:
         raise ValueError(f"{path}: the file does not say in which axes its positions are")
     kept = np.isfinite(arc.position).all(axis=1)
@@ -200,7 +203,7 @@ def _of_orbit(orbit: Any, near: Epoch, chosen: str | None, path: str) -> Guess:
         position, velocity = found.r[0], found.v[0]
     epoch = arc.epoch + at
     turned = transform(position, velocity, arc.frame, "GCRF", arc.frame_epoch or epoch)
-    return Guess(epoch, turned[0], np.asarray(turned[1]), path)
+    return Guess(epoch, turned[0], np.asarray(turned[1]), path, about=about)
 
 
 def _arcs(found: Ephemeris, chosen: str | None, path: str) -> tuple[Arc, ...]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from piazzi.determination.centres import Centre, centre_of
 from piazzi.determination.sights import observers, rows_of
 from piazzi.earth import Epoch
-from piazzi.earth.constants import GM
 from piazzi.estimate.batch import BatchLeastSquares, undisturbed
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.information import along
@@ -21,8 +21,6 @@ from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import prepare
 
-EARTH = Region(GM["earth"], 6378136.3 + 100e3, 1e9)
-STRETCH = 4 * 3600.0  # s: passes of some low revolutions, a good part of a night
 LONGER = 4.0  # how much longer each next stretch is
 ENOUGH = 5  # rows of a stretch
 MOST = 6  # two-body orbits that are refined
@@ -51,6 +49,20 @@ class OrbitMode:
     rows: int
 
 
+@dataclass(frozen=True)
+class Parting:
+    """Where two orbits are farthest apart soon after the last row: an instant, the station that sees it, m, and rad there."""
+
+    epoch: Epoch
+    station: str
+    distance: float
+    angle: float
+
+    def __str__(self) -> str:
+        degrees = np.degrees(self.angle)
+        return f"{self.distance / 1e3:,.1f} km, {degrees:.3g} deg on the sky of {self.station}, on {self.epoch}"
+
+
 @dataclass(frozen=True, eq=False)
 class InitialOrbits:
     """Orbits that fit, the most probable first.
@@ -59,27 +71,29 @@ class InitialOrbits:
     ----------
     modes : the orbits
     starts, fits : of two-body motion, from how many starts, and how many ended
-    apart : where the first two part next: an instant, the station that sees it, and by how many metres; None where there is one
+    apart : where the first two part next; None where there is one
+    about : what they go about, "earth" or "sun"
     """
 
     modes: tuple[OrbitMode, ...]
     starts: int
     fits: int
-    apart: tuple[Epoch, str, float] | None = None
+    apart: Parting | None = None
+    about: str = "earth"
 
     def __str__(self) -> str:
-        lines = [f"{len(self.modes)} orbits fit ({self.fits} fits from {self.starts} starts)"]
+        many = "1 orbit fits" if len(self.modes) == 1 else f"{len(self.modes)} orbits fit"
+        lines = [f"{many} about the {self.about.title()} ({self.fits} fits from {self.starts} starts)"]
         for mode in self.modes:
             r, v = np.linalg.norm(mode.mean[:3]) / 1e3, np.linalg.norm(mode.mean[3:])
-            where = f"{r:,.1f} km from the centre at {v:,.1f} m/s on {mode.epoch.to('UTC')}"
+            where = f"{r:,.1f} km from the centre at {v:,.1f} m/s on {mode.epoch}"
             lines.append(f"  probability {mode.probability:.3f}: {where}, weighted RMS {mode.weighted_rms:.2f} of {mode.rows}")
         if self.apart is not None:
-            when, station, metres = self.apart
-            lines.append(f"The first two are {metres / 1e3:,.1f} km apart for {station} on {when.to('UTC')}")
+            lines.append(f"The first two part by {self.apart}")
         return "\n".join(lines)
 
 
-def initial_orbits(problem: Problem, tracking: Tracking, region: Region = EARTH) -> InitialOrbits:
+def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None = None) -> InitialOrbits:
     """All orbits that fit a tracking, from any mix of sensors, without a guess.
 
     Every classical method that the rows allow, and a sample of the admissible region, start two-body fits; the best are refined
@@ -87,9 +101,10 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region = EARTH)
 
     Parameters
     ----------
-    problem : states x, y, z, vx, vy, vz (m, m/s), with an epoch; its prior is not used
+    problem : states x, y, z, vx, vy, vz (m, m/s), with an epoch; its prior is not used.  Orbits go about the Sun where its
+        stations are seen from there (``earth.Place(..., about="sun")``).
     tracking : rows of positions, distances, their rates, or directions
-    region : which orbits are admissible
+    region : which orbits are admissible; default bound ones above the surface, out to a million km or 60 astronomical units
 
     Raises
     ------
@@ -98,8 +113,10 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region = EARTH)
     """
     if problem.model.states[:6] != ("x", "y", "z", "vx", "vy", "vz") or problem.epoch is None:
         raise ValueError("initial orbits need a problem with states x, y, z, vx, vy, vz and an epoch")
+    centre = _centre(problem)
+    region = centre.region if region is None else region
     rows, index = rows_of(problem, tracking)
-    first = first_stretch(rows, STRETCH)
+    first = first_stretch(rows, centre.stretch)
     search = two_body_modes(rows.of(first), region)
     if not search.modes:
         raise ValueError(f"no orbit fits the {len(np.unique(index[first]))} rows of the first stretch ({search.starts} starts)")
@@ -107,8 +124,12 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region = EARTH)
     begin = float(rows.t[first].min())
     refined = [*_refined(problem, tracking, search, inside[:MOST], begin, float(rows.t[first].max()), region)]
     modes = _weighed(refined) or tuple(_unrefined(problem, search, inside[:MOST], len(np.unique(index[first]))))
-    apart = _apart(problem, tracking, modes, region) if len(modes) > 1 else None
-    return InitialOrbits(modes, search.starts, search.fits, apart)
+    apart = _apart(problem, tracking, modes, centre) if len(modes) > 1 else None
+    return InitialOrbits(modes, search.starts, search.fits, apart, centre.name)
+
+
+def _centre(problem: Problem) -> Centre:
+    return centre_of(next((p.about for s in problem.stations if (p := s.place) is not None and hasattr(p, "about")), "earth"))
 
 
 def first_stretch(rows: Rows, length: float) -> Array:
@@ -221,25 +242,29 @@ def _unrefined(problem: Problem, search: Search, modes: list[Mode], rows: int) -
         yield OrbitMode(epoch, mode.state, half @ half.T, mode.probability, rms, rows)
 
 
-def _apart(
-    problem: Problem, tracking: Tracking, modes: tuple[OrbitMode, ...], region: Region
-) -> tuple[Epoch, str, float] | None:
-    """Where the first two are farthest apart within a day after the last row, for a station that has one above its horizon."""
+def _apart(problem: Problem, tracking: Tracking, modes: tuple[OrbitMode, ...], centre: Centre) -> Parting | None:
+    """Where the first two are farthest apart within six `stretch` after the last row, for a station that sees one."""
     last = float(tracking.row_times.max())
-    t = last + np.arange(60.0, 86400.0, 120.0)
+    t = last + centre.stretch * np.linspace(1 / 240, 6.0, 720)
     paths = []
     for mode in modes[:2]:
         begin = mode.epoch - problem.epoch
-        paths.append(propagate_kepler(mode.mean[:3], mode.mean[3:], region.mu, t - begin)[0])
-    best: tuple[float, float, str] | None = None
+        paths.append(propagate_kepler(mode.mean[:3], mode.mean[3:], centre.mu, t - begin)[0])
+    away = np.linalg.norm(paths[0] - paths[1], axis=1)
+    best: Parting | None = None
     for station in problem.stations:
         if station.place is None:
             continue
-        place, _ = observers(problem, station, t)
-        up = place / np.linalg.norm(place, axis=1)[:, None]
-        above = np.any([np.sum((p - place) * up, axis=1) > 0.1 * np.linalg.norm(p - place, axis=1) for p in paths], axis=0)
-        away = np.where(above, np.linalg.norm(paths[0] - paths[1], axis=1), 0.0)
-        k = int(np.argmax(away))
-        if away[k] > 0 and (best is None or away[k] > best[0]):
-            best = float(away[k]), float(t[k]), station.name
-    return None if best is None else (problem.epoch + best[1], best[2], best[0])
+        place, _ = observers(problem.epoch, station, t)
+        lines = [p - place for p in paths]
+        far = [np.linalg.norm(line, axis=1) for line in lines]
+        above = np.ones(len(t), dtype=bool)
+        if centre.name == "earth" and place.any():
+            up = place / np.linalg.norm(place, axis=1)[:, None]
+            above = np.any([np.sum(line * up, axis=1) > 0.1 * d for line, d in zip(lines, far, strict=True)], axis=0)
+        k = int(np.argmax(np.where(above, away, 0.0)))
+        if above[k] and (best is None or away[k] > best.distance):
+            one, other = (line[k] / d[k] for line, d in zip(lines, far, strict=True))
+            angle = float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))
+            best = Parting(problem.epoch + float(t[k]), station.name, float(away[k]), angle)
+    return best

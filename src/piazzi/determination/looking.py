@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination.centres import EARTH
 from piazzi.determination.course import Course
-from piazzi.determination.guesses import MU
 from piazzi.determination.sites import sites_of, station_named
 from piazzi.determination.words import pairs, quantity
 from piazzi.earth import Epoch, Station, body, rotation, sensors
@@ -137,8 +137,8 @@ def _motion(given: Observer, t: Array, states: Array) -> tuple[Array, Array]:
     """Rates of the direction to the east and to the north, rad/s: by two looks, at the same orbit a little later and before."""
     r, v = states[:, :3], states[:, 3:]
     distance = np.linalg.norm(r, axis=1, keepdims=True)
-    h = DIFFERENCE * float(np.sqrt(distance.min() ** 3 / MU))
-    pull = -MU * r / distance**3  # the same before and after: what it lacks leaves the difference as it is
+    h = DIFFERENCE * float(np.sqrt(distance.min() ** 3 / EARTH.mu))
+    pull = -EARTH.mu * r / distance**3  # the same before and after: what it lacks leaves the difference as it is
     before, after = (given.measure(DIRECTION, t + s, np.hstack([r + s * v + s * s / 2 * pull, v + s * pull])) for s in (-h, h))
     turned = (after[:, 0] - before[:, 0] + np.pi) % (2.0 * np.pi) - np.pi
     return turned * np.cos((after[:, 1] + before[:, 1]) / 2) / (2 * h), (after[:, 1] - before[:, 1]) / (2 * h)

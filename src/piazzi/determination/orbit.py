@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.guesses import MU
+from piazzi.determination.centres import EARTH, Centre
 from piazzi.earth import Epoch, rotation_rate
 from piazzi.earth.rotation import TURNING, frame_named
 from piazzi.orbit import Keplerian, state_axes, transform_root
@@ -18,6 +18,14 @@ from piazzi.problem.checks import Array
 FLOOR = 1e-15  # of a correlation's largest eigenvalue: rounding, below which none is written
 KEPLERIAN = ("a", "e", "i", "raan", "argp", "nu")
 UNITS = ("m", "", "rad", "rad", "rad", "rad")
+ECLIPTIC = "ecliptic J2000"  # axes of elements about the Sun
+OBLIQUITY = np.radians(84381.448 / 3600.0)  # of J2000, IAU 1976, as ephemerides of minor planets have it
+_TILT = np.array([
+    [1.0, 0.0, 0.0],
+    [0.0, np.cos(OBLIQUITY), np.sin(OBLIQUITY)],
+    [0.0, -np.sin(OBLIQUITY), np.cos(OBLIQUITY)],
+])  # fmt: skip
+TO_ECLIPTIC = np.kron(np.eye(2), _TILT)  # of states on the axes of EME2000
 Beliefs = Callable[[Sequence[Epoch]], tuple[Array, Array]]
 
 
@@ -29,12 +37,14 @@ class Orbit:
     ----------
     epoch : where the answer stands
     frame : axes of what it gives
+    centre : what it goes about
     beliefs : gives states (K, 6) and covariances (K, 6, 6) on the axes of the GCRF at K dates
     """
 
     epoch: Epoch
     frame: str
     beliefs: Beliefs
+    centre: Centre = EARTH
 
     def at(self, epoch: Any = None) -> Array:
         """Position and velocity (6,) at a date, m and m/s; default where the answer stands."""
@@ -52,7 +62,7 @@ class Orbit:
             return self._moved(when)[1]
         mean, P = (values[0] for values in self.beliefs([when]))
         if axes.upper().startswith(("RTN", "TNW")):
-            return transform_root(definite_root(P), state_axes(mean[:3], mean[3:], axes, MU))
+            return transform_root(definite_root(P), state_axes(mean[:3], mean[3:], axes, self.centre.mu))
         return transform_root(definite_root(P), jacobian(frame_named(axes), when))
 
     def to(self, frame: str) -> Orbit:
@@ -62,16 +72,21 @@ class Orbit:
     def elements(self, epoch: Any = None) -> dict[str, Any]:
         """Keplerian elements with their sigmas, SI and radians; None where there is no sigma, as of the pericentre of a circle.
 
-        In axes that turn with the Earth there are no elements: they are those of the GCRF.
+        In axes that turn with the Earth there are no elements: they are those of the GCRF.  About the Sun they are those of the
+        ecliptic and equinox of J2000.
         """
         frame = "GCRF" if self.frame in TURNING else self.frame
+        frame = "EME2000" if self.centre.name == "sun" else frame
         orbit = self if frame == self.frame else self.to(frame)
         mean, root = orbit._moved(self._epoch(epoch))
+        if self.centre.name == "sun":
+            frame = ECLIPTIC
+            mean, root = TO_ECLIPTIC @ mean, TO_ECLIPTIC @ root
         kind = Keplerian()
-        values = kind.from_state(mean[:3], mean[3:], MU)
+        values = kind.from_state(mean[:3], mean[3:], self.centre.mu)
         wrapped = np.where([False, False, False, True, True, True], values % (2.0 * np.pi), values)
         try:
-            moved = kind.jacobian_from_state(mean[:3], mean[3:], MU) @ root
+            moved = kind.jacobian_from_state(mean[:3], mean[3:], self.centre.mu) @ root
             sigma: list[float | None] = np.sqrt((moved**2).sum(axis=1)).tolist()
         except ValueError:
             sigma = [None] * 6

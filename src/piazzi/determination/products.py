@@ -6,27 +6,30 @@ import csv
 import io
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from piazzi.determination.arcs import dates_of, ephemeris, inflation, is_formal, one_state, scale_of
+from piazzi.determination.case_text import case_tables
 from piazzi.determination.document import document, solution
 from piazzi.determination.residuals import table
-from piazzi.determination.words import date, seconds
 from piazzi.earth import Epoch
-from piazzi.earth.rotation import frame_named
-from piazzi.formats import Arc, Ephemeris, ocm_text, oem_text, opm_text
+from piazzi.earth.eop import mjd_text, tables
+from piazzi.formats import ocm_text, oem_text, opm_text
 from piazzi.formats.tle import tle_text
 from piazzi.io import hdf5
 from piazzi.io.atomic import atomic_path
+from piazzi.io.scenario_text import scenario_text
 from piazzi.orbit import fit_sgp4
 from piazzi.text import escape_formula, printable
 
-ENDINGS = (".oem", ".opm", ".ocm", ".tle", ".nc", ".csv", ".json")
-ORBITS = (".oem", ".opm", ".ocm", ".tle")
-STEP = 60.0  # s
-MOST_STATES = 200_000
+ENDINGS = (".oem", ".opm", ".ocm", ".tle", ".nc", ".csv", ".json", ".toml")
+MESSAGES = (".oem", ".opm", ".ocm")  # that have comments
+LONGEST = 240  # of a comment
 
 
 def check_ending(path: Any) -> str:
@@ -37,131 +40,55 @@ def check_ending(path: Any) -> str:
     return ending
 
 
-def write(found: Any, path: Any, *, span: Any = None, step: float | None = None, formal: bool = False) -> None:
-    """Write a product by the suffix of its name.
+def write(found: Any, path: Any, *, span: Any = None, step: float | None = None, formal: bool | None = None) -> None:
+    """Write a product by the suffix of its name, whole or not at all.
 
     Parameters
     ----------
     found : Determination
     path : its name
     span, step : of an ephemeris, see `ephemeris`
-    formal : whether covariances are written as computed where the verdict calls them too small
+    formal : whether covariances are written as computed where the verdict calls them too small; default what the case says
     """
     ending = check_ending(path)
+    if ending == ".tle" and found.setup.measured.about != "earth":
+        raise ValueError(f"-o {path}: two lines of elements are of orbits about the Earth; write .oem, .opm or .json")
     if ending == ".nc":
         _dataset(found, path)
         return
+    who = found.case.originator or "PIAZZI"
     text = {
-        ".oem": lambda: oem_text(ephemeris(found, span, step, formal=formal)),
-        ".opm": lambda: opm_text(one_state(found, formal)),
+        ".oem": lambda: oem_text(ephemeris(found, span, step, formal=formal), originator=who),
+        ".opm": lambda: opm_text(one_state(found, formal), originator=who),
         ".ocm": lambda: ocm_text(
-            ephemeris(found, span, step, formal=formal).arcs[0], determination=block(found), basis="DETERMINED"
+            ephemeris(found, span, step, formal=formal).arcs[0], determination=block(found), basis="DETERMINED", originator=who
         ),
-        ".tle": lambda: tle_text(fit_sgp4(ephemeris(found, span, step, "TEME")).mean),
+        ".tle": lambda: _elements(found, span, step),
         ".csv": lambda: residual_text(found),
         ".json": lambda: json.dumps(document(found), allow_nan=False, indent=1) + "\n",
+        ".toml": lambda: problem_text(found),
     }[ending]()
-    if ending in ORBITS and ending != ".tle":
-        text = with_comments(text, comments(found))
+    if ending in MESSAGES:
+        text = with_comments(text, comments(found, formal))
     with atomic_path(path) as work:
         work.write_text(text, encoding="utf-8")
 
 
-def dates_of(found: Any, span: Any) -> tuple[Epoch, Epoch]:
-    """The two ends of ``"first .. last+3d"``; default the rows that were used, and the answer.
-
-    Raises
-    ------
-    ValueError
-        For what cannot be read.
-    """
-    times = found.setup.tracking.row_times[found.keep]
-    zero = found.setup.measured.epoch
-    first, last = zero + float(times.min()), zero + float(times.max())
-    if span is None:
-        return min(first, found.epoch), max(last, found.epoch)
-    ends = span.split("..") if isinstance(span, str) else list(span)
-    if len(ends) != 2:
-        raise ValueError(f'--span {span!r}: write two ends with .. between them, as "first .. last+3d"')
-    begin, end = (end_of(one, first, last, default) for one, default in zip(ends, (first, last), strict=True))
-    if end < begin:
-        raise ValueError(f"--span {span!r}: it ends before it begins")
-    return begin, end
+def _elements(found: Any, span: Any, step: float | None) -> str:
+    """Two-line elements by a fit to the orbit over the span."""
+    mean = fit_sgp4(ephemeris(found, span, step, "TEME")).mean
+    if found.case.norad is not None:
+        mean = replace(mean, said=(*mean.said, ("NORAD_CAT_ID", str(found.case.norad))))
+    return tle_text(mean)
 
 
-def end_of(text: Any, first: Epoch, last: Epoch, default: Epoch) -> Epoch:
-    """One end of a span: first, last, either with a length of time added or taken off, or a date."""
-    if isinstance(text, Epoch):
-        return text
-    plain = str(text or "").strip()
-    if not plain:
-        return default
-    for word, base in (("first", first), ("last", last)):
-        if plain.startswith(word):
-            rest = plain.removeprefix(word).strip()
-            if not rest:
-                return base
-            if rest[0] in "+-":
-                length = seconds(rest[1:].strip(), f"--span: {word}")
-                return base + (length if rest[0] == "+" else -length)
-    return date(plain, "--span")
-
-
-def check_span(span: Any) -> None:
-    """Raise ValueError for a span that cannot be read, before there is a result."""
-    if span is None:
-        return
-    any_date = Epoch.at(0.0)
-    ends = span.split("..") if isinstance(span, str) else list(span)
-    if len(ends) != 2:
-        raise ValueError(f'--span {span!r}: write two ends with .. between them, as "first .. last+3d"')
-    for one in ends:
-        end_of(one, any_date, any_date, any_date)
-
-
-def ephemeris(
-    found: Any, span: Any = None, step: float | None = None, frame: str | None = None, *, formal: bool = False
-) -> Ephemeris:
-    """States and covariances over a span, every `step` seconds (default 60) from its beginning, its end too."""
-    begin, end = dates_of(found, span)
-    width = STEP if step is None else float(step)
-    if not width > 0:
-        raise ValueError(f"--step is {width:g} s; it must be positive")
-    length = end - begin
-    if length / width > MOST_STATES:
-        raise ValueError(
-            f"--span with --step {width:g} s makes {length / width:,.0f} states; at most {MOST_STATES:,} are written"
-        )
-    t = width * np.arange(int(length / width + 1e-9) + 1)
-    t = np.append(t, length) if length - t[-1] > 1e-6 else t
-    return Ephemeris(arcs=(arc_of(found, begin, t, frame, formal),), format="OEM")
-
-
-def one_state(found: Any, formal: bool = False) -> Arc:
-    """The answer as an arc of one state."""
-    return arc_of(found, found.epoch, np.zeros(1), None, formal)
-
-
-def arc_of(found: Any, begin: Epoch, t: Any, frame: str | None, formal: bool) -> Arc:
-    """States at times past a date, with their covariances, in the axes of the answer or others."""
-    orbit = found.orbit if frame is None else found.orbit.to(frame_named(frame))
-    mean, roots = orbit.states([begin + float(x) for x in t])
-    roots = roots * (1.0 if formal else inflation(found))
-    return Arc(
-        epoch=begin, t=t, position=mean[:, :3], velocity=mean[:, 3:], name=found.object or "UNKNOWN",
-        centre="EARTH", frame=orbit.frame, scale=_scale(found), covariance_t=t,
-        covariance=roots @ np.swapaxes(roots, 1, 2), covariance_frames=(orbit.frame,) * len(t),
-    )  # fmt: skip
-
-
-def inflation(found: Any) -> float:
-    """What sigmas are multiplied by where the verdict says that they are too small."""
-    honest = found.verdict["honest"]
-    return float(honest.figure) if honest.ok is False and honest.figure and honest.figure > 1.0 else 1.0
-
-
-def _scale(found: Any) -> str:
-    return str(found.scale) if found.scale in ("UTC", "TAI", "TT", "TDB", "GPS", "UT1", "TCG") else "UTC"
+def problem_text(found: Any) -> str:
+    """The whole problem with the times of its measurements, as a scenario that every command loads; and its case."""
+    with suppress(ValueError):  # a case of objects that are known in Python only
+        own = replace(found.case, output=(), report=None)  # who runs the file again asks for what is to be written
+        tables_ = case_tables(own, found.setup, Path.cwd())
+        return scenario_text(found.problem, found.tracking.times, tuple(found.estimates), tables_)
+    return scenario_text(found.problem, found.tracking.times, tuple(found.estimates))
 
 
 def block(found: Any) -> dict[str, object]:
@@ -170,7 +97,7 @@ def block(found: Any) -> dict[str, object]:
     count, used = (sum(one[key] for one in facts["residuals"]) for key in ("count", "used"))
     model = found.problem.model
     out: dict[str, object] = {
-        "OD_ID": "1", "OD_METHOD": f"{found.name} (Piazzi)", "OD_EPOCH": found.epoch.to(_scale(found)).split()[0],
+        "OD_ID": "1", "OD_METHOD": f"{found.name} (Piazzi)", "OD_EPOCH": found.epoch.to(scale_of(found)).split()[0],
         "OBS_AVAILABLE": count, "OBS_USED": used, "SOLVE_N": len(model.names), "SOLVE_STATES": ",".join(model.names),
         "SENSORS_N": len({one["station"] for one in facts["residuals"]}),
         "SENSORS": ",".join(dict.fromkeys(printable(one["station"]) for one in facts["residuals"])),
@@ -182,22 +109,36 @@ def block(found: Any) -> dict[str, object]:
     return out
 
 
-def comments(found: Any) -> Iterator[str]:
-    """What a file says of itself: the verdict, the command, the measurements."""
+def comments(found: Any, formal: bool | None = None) -> Iterator[str]:
+    """What a file says of itself: the verdict, the command, the measurements, and how old the data are."""
     for sentence in found.verdict.values():
         yield sentence.sentence
     factor = inflation(found)
-    if factor > 1.0:
+    if factor > 1.0 and is_formal(found, formal):
+        yield f"Covariances are those of the fit, though residuals are {factor:.3g} times their sigmas."
+    elif factor > 1.0:
         yield f"Covariances are those of the fit times {factor**2:.3g}: residuals are {factor:.3g} times their sigmas."
     if found.notes.get("command"):
         yield f"Made by: {found.notes['command']}"
     facts = document(found)
     yield f"Measurements from {facts['span']['first']} to {facts['span']['last']}."
+    yield _age(dates_of(found, None)[1], found.setup.chosen.choice.eop)
+
+
+def _age(last: Epoch, given: Any) -> str:
+    """What the orientation of the Earth was taken from, and whether it was measured by then."""
+    eop = tables() if given is None else given
+    if not np.isfinite(getattr(eop, "measured", np.nan)):
+        return "Earth orientation: constants, or a table that does not say what was measured."
+    day = mjd_text(eop.measured)
+    ahead = last.reading("UTC").day - eop.measured
+    state = f"predicted over the last {ahead:.0f} days" if ahead > 0 else "so at all of these dates"
+    return f"Earth orientation of {', '.join(Path(file).name for file in eop.source.split(', '))}: measured to {day}, {state}."
 
 
 def with_comments(text: str, lines: Iterator[str] | Sequence[str]) -> str:
     """A message with comments behind its header."""
-    said = [f"COMMENT {printable(line)[:240]}" for line in lines]
+    said = [f"COMMENT {printable(line)[:LONGEST]}" for line in lines]
     before = text.split("\n")
     return "\n".join([before[0], *said, *before[1:]])
 
@@ -208,10 +149,10 @@ def residual_text(found: Any) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     names = ("station", "component", "unit", "observed", "computed", "o_minus_c", "sigma", "weight", "used", "reason")
-    writer.writerow([f"time[{_scale(found)}]", *names])
+    writer.writerow([f"time[{scale_of(found)}]", *names])
     for i, t in enumerate(rows["t"].tolist()):
         cells = [_cell(rows[name][i]) for name in names]
-        writer.writerow([(zero + t).to(_scale(found)).split()[0], *cells])
+        writer.writerow([(zero + t).to(scale_of(found)).split()[0], *cells])
     return out.getvalue()
 
 

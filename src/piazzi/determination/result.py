@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis
 from piazzi.determination.beliefs import beliefs
+from piazzi.determination.case import Case
 from piazzi.determination.orbit import Orbit
 from piazzi.determination.setup import Setup, carried
 from piazzi.determination.verdict import DECISIVE, Sentence
@@ -40,6 +41,7 @@ class Determination:
     frame : axes of the answer
     seconds : of all estimators together
     notes : further facts, as a result tells them: options, files
+    case : what was asked for, products among it
     """
 
     setup: Setup
@@ -53,6 +55,7 @@ class Determination:
     frame: str
     seconds: float
     notes: Mapping[str, Any]
+    case: Case = field(default_factory=Case)
 
     @property
     def estimate(self) -> Estimate:
@@ -102,7 +105,7 @@ class Determination:
         def at(epochs: Sequence[Epoch]) -> tuple[Array, Array]:
             return beliefs(self.setup, self.estimate, epochs)
 
-        return Orbit(self.epoch, self.frame, at)
+        return Orbit(self.epoch, self.frame, at, self.setup.measured.centre)
 
     @property
     def modes(self) -> tuple[dict[str, Any], ...]:
@@ -141,7 +144,10 @@ class Determination:
         return document(self)
 
     def write(self, path: Any, **options: Any) -> None:
-        """Write a product by the suffix of its name, whole or not at all: .oem .opm .ocm .tle .nc .csv .json .toml."""
+        """Write a product by the suffix of its name, whole or not at all: .oem .opm .ocm .tle .nc .csv .json .toml.
+
+        Options are ``span``, ``step`` and ``formal``, whether covariances are written as computed; default those of `case`.
+        """
         from piazzi.determination.products import write
 
         write(self, path, **options)
@@ -163,7 +169,7 @@ class Determination:
             return ephemeris(self, station, when, step=STEP if step is None else step, **seen)
         if seen:
             raise ValueError(f"{next(iter(seen))}: what is seen is seen from somewhere: give station=")
-        from piazzi.determination.products import ephemeris as states
+        from piazzi.determination.arcs import ephemeris as states
 
         return states(self, span, step, frame)
 

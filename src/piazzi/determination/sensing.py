@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination.centres import Centre, centre_of
 from piazzi.determination.directions import AZEL, RADEC, ascensions, azimuths
 from piazzi.determination.fixes import fixes
 from piazzi.determination.parts import Part
@@ -45,6 +46,7 @@ class Measured:
     labels : for each station of the problem, the name by which users know it
     functions, parameters : that sensors need beside those of the forces: data, and numbers or beliefs with their roles
     labels_of_constants : how users know those of the parameters that have names for kernels only
+    about : what the orbit goes about, "earth" or "sun"
     assumed, left_out : what was assumed; why, and how many rows are not in the tracking
     """
 
@@ -61,6 +63,12 @@ class Measured:
     assumed: tuple[str, ...] = ()
     left_out: Mapping[str, int] = field(default_factory=dict)
     labels_of_constants: Mapping[str, Label] = field(default_factory=dict)
+    about: str = "earth"
+
+    @property
+    def centre(self) -> Centre:
+        """What the orbit goes about."""
+        return centre_of(self.about)
 
     @property
     def first(self) -> Epoch:
@@ -75,6 +83,8 @@ def measured(
     com: float | None = None,
     corrections: str | None = None,
     clocks: bool = False,
+    name: str | None = None,
+    about: str = "earth",
 ) -> Measured:
     """Sensors, stations and tracking of observations of one object.
 
@@ -85,6 +95,8 @@ def measured(
     com : what ranges are shorter by than to the centre of mass, m; default by the object's name
     corrections : "applied" or "open", whether media are corrected for already where the files do not say it
     clocks : whether sensors have a number that times are late by
+    name : of the object, where the files do not say it
+    about : what the orbit goes about
 
     Raises
     ------
@@ -108,9 +120,8 @@ def measured(
     _check_sigmas(everything, index)
     epoch = Epoch.at(float(everything.epoch.whole + np.floor(everything.t[index[0]])))
     known = everything.objects
-    context = Context(
-        everything, epoch, sites, known[0] if known else "", com, corrections == "applied", corrections == "open", clocks
-    )
+    own = known[0] if known else name or ""
+    context = Context(everything, epoch, sites, own, com, corrections == "applied", corrections == "open", clocks, about)
     parts = _parts(context, index)
     sensors, places, names, labels = _stations(parts)
     times = np.concatenate([part.t for part in parts]) + (everything.epoch - epoch)
@@ -127,7 +138,7 @@ def measured(
         {name: value for part in parts for name, value in part.functions.items()},
         {name: value for part in parts for name, value in part.parameters.items()},
         tuple(dict.fromkeys([*said, *(text for part in parts for text in part.assumed)])),
-        left_out,
+        left_out, about=about,
     )  # fmt: skip
 
 
@@ -144,9 +155,12 @@ def _check_sigmas(observations: Observations, index: Array) -> None:
 
 
 def of_object(observations: Observations, chosen: str | None) -> Observations:
-    """The rows of one object; raises ValueError with the list where there are several, or not that one."""
+    """The rows of one object; raises ValueError with the list where there are several, or not that one.
+
+    Rows of which no file says what they are of are of any object.
+    """
     known = observations.objects
-    if chosen is None:
+    if chosen is None or not known:
         if len(known) > 1:
             more = f" and {len(known) - 8} more" if len(known) > 8 else ""
             raise ValueError(
@@ -181,6 +195,8 @@ def _parts(context: Context, index: Array) -> list[Part]:
     found: list[Part] = []
     kinds = observations.kind[index]
     taken = np.zeros(len(index), dtype=np.bool_)
+    if context.about == "sun":
+        _only_directions(context, kinds)
     for names, maker in MAKERS.items():
         own = np.isin(kinds, [i for i, kind in enumerate(observations.kinds) if kind in names])
         if own.any():
@@ -191,6 +207,15 @@ def _parts(context: Context, index: Array) -> list[Part]:
         known = ", ".join(n for names in MAKERS for n in names)
         raise ValueError(f"{_where(observations)}{kind} is not determined from yet; what is, is {known}")
     return found
+
+
+def _only_directions(context: Context, kinds: Array) -> None:
+    """Raise ValueError for rows that are not determined from about the Sun."""
+    other = [kind for i, kind in enumerate(context.observations.kinds) if i in kinds and kind not in RADEC]
+    if other:
+        raise ValueError(
+            f"{context.where}{other[0]} is not determined from about the Sun yet; right ascension and declination are"
+        )
 
 
 def _padded(values: Array, width: int, blank: float) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
@@ -14,7 +15,7 @@ from piazzi.determination.motion import Extra, process_noise, with_processes
 from piazzi.determination.orbit_forces import Chosen
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import Label
-from piazzi.earth import Epoch
+from piazzi.earth import EphemerisWarning, Epoch
 from piazzi.kernels import RungeKutta8
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.arcs import Steps, arc
@@ -121,10 +122,17 @@ def posed(
         parameters={**numbers, **{p.parameter: p.time for p in extra.processes}},
         manoeuvres=extra.manoeuvres,
         integrator=RungeKutta8(max_step=chosen.max_step),
-        functions={**chosen.choice.functions(measured.epoch, air), **functions},
+        functions={**_data(chosen, measured.epoch, air), **functions},
         epoch=measured.epoch,
         name=measured.object,
     )
+
+
+def _data(chosen: Chosen, epoch: Epoch, air: Any) -> Mapping[str, Any]:
+    """Data of the forces; where planets are by series a result says so, once."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", EphemerisWarning)
+        return chosen.choice.functions(epoch, air)
 
 
 def scale_of(given: Setup, first: Array) -> Array:

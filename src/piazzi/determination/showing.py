@@ -116,7 +116,11 @@ def remarks(facts: dict[str, Any]) -> Iterator[str]:
     """Forces, constants, what was left out and what was assumed."""
     forces = facts["forces"]
     extra = [k for k in ("relativity", "radiation", "drag") if forces[k]]
-    field = f"{forces['gravity']} to degree {forces['degree']}" if forces["degree"] else "the Earth as a point"
+    field = (
+        f"{forces['gravity']} to degree {forces['degree']}"
+        if forces["degree"]
+        else f"the {facts.get('about', 'earth').title()} as a point"
+    )
     names = [field, *forces["bodies"], *(f"{t} tides" for t in forces["tides"]), *extra, *forces["empirical"]]
     yield f"Forces ({forces['source']}): {', '.join(names)}."
     if "against" in facts:
@@ -142,7 +146,12 @@ def line(found: Any) -> str:
 def shown(given: Setup) -> str:
     """Forces, unknowns, noise and assumptions of a problem that is not solved yet."""
     problem, chosen, measured = given.problem, given.chosen, given.measured
-    facts = {"forces": chosen.facts, "left_out": {**chosen.left_out, **measured.left_out}, "assumed": given.assumed}
+    facts = {
+        "about": measured.about,
+        "forces": chosen.facts,
+        "left_out": {**chosen.left_out, **measured.left_out},
+        "assumed": given.assumed,
+    }
     lines = [f"{measured.object or 'the object'}: {len(given.tracking.times):,} epochs from {measured.first}"]
     lines += [
         f"Begins at {given.guess.epoch} from {given.guess.source}: {', '.join(f'{v:.6g}' for v in given.guess.state)} (m, m/s)."

@@ -6,12 +6,19 @@ that stands still along the measured direction.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from piazzi.earth import Epoch
+from piazzi.earth.constants import SPEED_OF_LIGHT
 from piazzi.earth.geodetic import position_to_geodetic
 from piazzi.earth.rotation import rotation
+from piazzi.earth.sensors.position import Turn
+from piazzi.earth.sensors.turning import barycentric_velocity
+from piazzi.model import Sensor
 from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, RATE, Rows
 from piazzi.problem import Problem, Station, Tracking
 from piazzi.problem.checks import Array
@@ -23,33 +30,52 @@ PAIRS = (("azimuth", "elevation"), ("right_ascension", "declination"))
 ROUNDS = 3
 
 
-def rows_of(problem: Any, tracking: Tracking, most: int = 600, *, ask: bool = True) -> tuple[Rows, Array]:
-    """At most so many rows of each station as vectors, and for each the row of the tracking.
+@dataclass(frozen=True, eq=False)
+class Sights:
+    """Who measured, and with what; `problem` is asked what its sensors add to geometry, None where it is not whole yet."""
 
-    Parameters
-    ----------
-    problem : with sensors, stations and an epoch
-    tracking : of the problem
-    most : rows of a station
-    ask : whether sensors are asked what they add, for which the problem has to be whole; else it is left in
+    sensors: Sequence[Sensor]
+    stations: Sequence[Station]
+    epoch: Epoch
+    problem: Problem | None = None
+
+    def sensor(self, station: Station) -> Sensor:
+        """That of a station."""
+        return next(s for s in self.sensors if s.name == station.sensor)
+
+
+def rows_of(problem: Problem, tracking: Tracking, most: int = 600) -> tuple[Rows, Array]:
+    """At most so many rows of each station as vectors, and for each the row of the tracking.
 
     Raises
     ------
     ValueError
         Where no sensor measures a distance, its rate, a direction or a position.
     """
-    places = {station.name: s for s, station in enumerate(problem.stations)}
-    which = tracking.stations_of(problem) if ask else np.array([places[name] for name in tracking.row_stations])
+    given = Sights(problem.model.sensors, problem.stations, problem.epoch, problem)
+    return _joined(given, tracking, tracking.stations_of(problem), most)
+
+
+def plain_rows(
+    sensors: Sequence[Sensor], stations: Sequence[Station], epoch: Epoch, tracking: Tracking, most: int = 600
+) -> tuple[Rows, Array]:
+    """The same by geometry alone: axes and the annual aberration are taken out, air and biases are left in."""
+    places = {station.name: s for s, station in enumerate(stations)}
+    which = np.array([places[name] for name in tracking.row_stations])
+    return _joined(Sights(sensors, stations, epoch), tracking, which, most)
+
+
+def _joined(given: Sights, tracking: Tracking, which: Array, most: int) -> tuple[Rows, Array]:
     t, z = tracking.row_times, tracking.values
     found: list[tuple[Rows, Array]] = []
-    for s, station in enumerate(problem.stations):
+    for s, station in enumerate(given.stations):
         own = np.flatnonzero(which == s)
         if len(own) > most:
             own = own[np.unique(np.linspace(0, len(own) - 1, most).astype(int))]
         if len(own):
-            found += _of_station(problem, station, t[own], z[own], own, ask)
+            found += _of_station(given, station, t[own], z[own], own)
     if not found:
-        sensors = ", ".join(s.name for s in problem.model.sensors)
+        sensors = ", ".join(s.name for s in given.sensors)
         raise ValueError(
             f"no sensor ({sensors}) measures distances, their rates, directions or positions: give an orbit to begin"
         )
@@ -59,24 +85,24 @@ def rows_of(problem: Any, tracking: Tracking, most: int = 600, *, ask: bool = Tr
     return joined, np.concatenate([j for _, j in found])
 
 
-def _of_station(problem: Any, station: Station, t: Array, z: Array, own: Array, ask: bool) -> list[tuple[Rows, Array]]:
-    sensor = next(s for s in problem.model.sensors if s.name == station.sensor)
+def _of_station(given: Sights, station: Station, t: Array, z: Array, own: Array) -> list[tuple[Rows, Array]]:
+    sensor = given.sensor(station)
     at = {name: i for i, name in enumerate(sensor.components)}
     noise = np.asarray(station.noise)
     variance = np.diag(noise) if noise.ndim == 2 else noise
     sigma = np.sqrt(variance)
     for place in PLACES:
         if set(place) <= set(at):
-            return _fixes(problem, station, t, z, own, [at[p] for p in place], sigma, ask)
+            return _fixes(given.problem, station, t, z, own, [at[p] for p in place], sigma)
     if station.place is None:
         return []
-    stands, velocity = observers(problem, station, t)
+    stands, velocity = observers(given.epoch, station, t)
     out: list[tuple[Rows, Array]] = []
     pair = next((p for p in PAIRS if set(p) <= set(at)), None)
-    u = _directions(problem, station, t, z, stands, pair, [at[p] for p in pair], ask) if pair else None
+    u = _directions(given, station, t, z, stands, pair, [at[p] for p in pair]) if pair else None
     if u is not None and pair is not None:
         i, j = (at[p] for p in pair)
-        east, _ = _frame(u, _pole(problem, station, t, pair), pair)
+        east, _ = _frame(u, _pole(given, station, t, pair), pair)
         on_sky = pair[0] in dict(getattr(sensor, "on_sky", ()) or ())
         first = np.full(len(t), sigma[i]) * (1.0 if on_sky else np.abs(np.cos(z[:, j])))
         out.append(_rows(DIRECTION, t, stands, velocity, u, np.stack([first, np.full(len(t), sigma[j])], -1), own, east))
@@ -85,9 +111,9 @@ def _of_station(problem: Any, station: Station, t: Array, z: Array, own: Array, 
         along = up if u is None else np.where(np.isfinite(u).all(axis=1, keepdims=True), u, up)
         i = at["range"]
         added = np.zeros(len(t))
-        if ask:
-            state = _states(problem, stands + z[:, i : i + 1] * along)
-            added = problem.measure(station.name, np.nan_to_num(state), t)[:, i] - z[:, i]
+        if given.problem is not None:
+            state = _states(given.problem, stands + z[:, i : i + 1] * along)
+            added = given.problem.measure(station.name, np.nan_to_num(state), t)[:, i] - z[:, i]
         value = np.zeros((len(t), 3))
         value[:, 0] = z[:, i] - np.where(np.abs(added) < 1e3, added, 0.0)
         out.append(_rows(RANGE, t, stands, velocity, value, np.full((len(t), 2), sigma[i]), own))
@@ -109,7 +135,7 @@ def _rows(
 
 
 def _fixes(
-    problem: Problem, station: Station, t: Array, z: Array, own: Array, at: list[int], sigma: Array, ask: bool
+    problem: Problem | None, station: Station, t: Array, z: Array, own: Array, at: list[int], sigma: Array
 ) -> list[tuple[Rows, Array]]:
     """Positions on the axes of the problem: what the sensor makes of a body at the centre plus what was measured, undone."""
     keep = np.isfinite(z[:, at]).all(axis=1)
@@ -117,7 +143,7 @@ def _fixes(
         return []
     t, z, own = t[keep], z[keep], own[keep]
     nothing = np.zeros((len(t), 3))
-    if not ask:
+    if problem is None:
         return [_rows(POSITION, t, nothing, nothing, z[:, at], np.full((len(t), 2), float(np.max(sigma[at]))), own)]
     columns = [problem.measure(station.name, _states(problem, np.tile(FAR * e, (len(t), 1))), t)[:, at] for e in np.eye(3)]
     turn = np.stack(columns, axis=-1) / FAR
@@ -125,16 +151,16 @@ def _fixes(
     return [_rows(POSITION, t, nothing, nothing, value, np.full((len(t), 2), float(np.max(sigma[at]))), own)]
 
 
-def observers(problem: Problem, station: Station, t: Array) -> tuple[Array, Array]:
+def observers(epoch: Epoch, station: Station, t: Array) -> tuple[Array, Array]:
     """Position and velocity (K, 3) of a station on the axes of the problem."""
     recipe: Any = station.place
     half = 0.5
-    before, here, after = (recipe.at([problem.epoch + float(v) for v in t + shift]) for shift in (-half, 0.0, half))
+    before, here, after = (recipe.at([epoch + float(v) for v in t + shift]) for shift in (-half, 0.0, half))
     return here, (after - before) / (2 * half)
 
 
 def _directions(
-    problem: Problem, station: Station, t: Array, z: Array, place: Array, pair: tuple[str, str], at: list[int], ask: bool
+    given: Sights, station: Station, t: Array, z: Array, place: Array, pair: tuple[str, str], at: list[int]
 ) -> Array:
     """Unit vectors (K, 3) along which the sensor measures what was measured; NaN where nothing was."""
     good = np.isfinite(z[:, at]).all(axis=1)
@@ -143,14 +169,15 @@ def _directions(
         return out
     t, z, place = t[good], z[good], place[good]
     lon, lat = z[:, at[0]], z[:, at[1]]
-    if pair[0] == "azimuth":
-        u = _from_horizon(problem, station, t, lon, lat)
+    if pair[0] == "azimuth":  # noqa: SIM108
+        u = _from_horizon(given, station, t, lon, lat)
     else:
-        u = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], -1)
-    if not ask:
+        u = _from_the_equator(given, station, t, lon, lat)
+    problem = given.problem
+    if problem is None:
         out[good] = u
         return out
-    which, pole = np.full(len(t), problem.station_index(station.name)), _pole(problem, station, t, pair)
+    which, pole = np.full(len(t), problem.station_index(station.name)), _pole(given, station, t, pair)
     for _ in range(ROUNDS):
         seen = problem.measure(station.name, _states(problem, place + FAR * u), t)
         full = np.full_like(z, np.nan)
@@ -163,9 +190,22 @@ def _directions(
     return out
 
 
-def _from_horizon(problem: Problem, station: Station, t: Array, azimuth: Array, elevation: Array) -> Array:
+def _from_the_equator(given: Sights, station: Station, t: Array, lon: Array, lat: Array) -> Array:
+    """Directions on the axes of the GCRF, as one who moves with the Earth, or about the Sun stands still, sees them."""
+    u = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], -1)
+    epochs = [given.epoch + float(v) for v in t]
+    makers = dict(getattr(given.sensor(station), "makers", ()))
+    for maker in makers.values():
+        if isinstance(maker, Turn):
+            u = (rotation(maker.frame, "GCRF", epochs) @ u[..., None])[..., 0]
+    if "earth_velocity" in makers:  # to first order: 1e-8 rad are left
+        u = u + barycentric_velocity(epochs) / SPEED_OF_LIGHT
+    return np.asarray(u / np.linalg.norm(u, axis=1)[:, None])
+
+
+def _from_horizon(given: Sights, station: Station, t: Array, azimuth: Array, elevation: Array) -> Array:
     """Directions on the axes of the GCRF, from north through east and up."""
-    turn, (east, north, up) = _horizon(problem, station, t)
+    turn, (east, north, up) = _horizon(given, station, t)
     local = (
         (np.cos(elevation) * np.sin(azimuth))[:, None] * east
         + (np.cos(elevation) * np.cos(azimuth))[:, None] * north
@@ -174,21 +214,21 @@ def _from_horizon(problem: Problem, station: Station, t: Array, azimuth: Array, 
     return np.asarray((turn @ local[..., None])[..., 0])
 
 
-def _horizon(problem: Problem, station: Station, t: Array) -> tuple[Array, tuple[Array, Array, Array]]:
+def _horizon(given: Sights, station: Station, t: Array) -> tuple[Array, tuple[Array, Array, Array]]:
     """Matrices (K, 3, 3) from the axes of the Earth to those of the problem, and east, north and up at the station."""
     recipe: Any = station.place
-    epochs = [problem.epoch + float(v) for v in t]
+    epochs = [given.epoch + float(v) for v in t]
     latitude, longitude, _ = position_to_geodetic(recipe.station.position(epochs[:1])[0])
     c, s, cl, sl = np.cos(longitude), np.sin(longitude), np.cos(latitude), np.sin(latitude)
     axes = np.array([-s, c, 0.0]), np.array([-sl * c, -sl * s, cl]), np.array([cl * c, cl * s, sl])
     return rotation("ITRF", "GCRF", epochs, recipe.eop), axes
 
 
-def _pole(problem: Problem, station: Station, t: Array, pair: tuple[str, str]) -> Array:
+def _pole(given: Sights, station: Station, t: Array, pair: tuple[str, str]) -> Array:
     """Unit vectors (K, 3) towards which the second angle grows."""
     if pair[0] != "azimuth":
         return np.tile([0.0, 0.0, 1.0], (len(t), 1))
-    turn, (_, _, up) = _horizon(problem, station, t)
+    turn, (_, _, up) = _horizon(given, station, t)
     return np.asarray(turn @ up)
 
 

@@ -31,6 +31,7 @@ class Context:
     corrected : whether the user says that measurements are corrected for media already
     open : whether the user says that they are not
     clocks : whether sensors have a number that times are late by
+    about : what the orbit goes about
     """
 
     observations: Observations
@@ -41,6 +42,7 @@ class Context:
     corrected: bool = False
     open: bool = False
     clocks: bool = False
+    about: str = "earth"
     said: dict[str, None] = field(default_factory=dict)
 
     def site(self, index: int) -> Station:

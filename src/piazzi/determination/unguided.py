@@ -1,22 +1,28 @@
-"""Where a fit begins when nobody says it: all orbits that the tracking allows."""
+"""Where a fit begins when nobody says it: all orbits that the tracking allows, about the Earth or about the Sun."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 
+from piazzi.determination.centres import EARTH, SUN, Centre
 from piazzi.determination.guesses import Guess
-from piazzi.determination.initial import EARTH, STRETCH, InitialOrbits, first_stretch, initial_orbits
+from piazzi.determination.initial import InitialOrbits, first_stretch, initial_orbits
 from piazzi.determination.sensing import Measured
-from piazzi.determination.sights import rows_of
+from piazzi.determination.sights import plain_rows
+from piazzi.earth import body
+from piazzi.earth.constants import ASTRONOMICAL_UNIT, SPEED_OF_LIGHT
+from piazzi.earth.sensors.turning import barycentric_velocity
+from piazzi.orbit.fits import DIRECTION, Rows
 from piazzi.orbit.modes import two_body_modes
 from piazzi.problem import Problem
 
 MOTION = 1e-2  # m/s^2: what two-body motion lacks in low orbits
 AIR = 1e-3  # rad: aberration and refraction, which are left in for a first look
+SLOW = np.radians(1.0) / 3600.0  # rad/s among the stars: the Moon does half of it
+FITS = 3.0  # sigma that residuals of an orbit that fits have at most, root mean square
 
 
 def first_look(seen: Measured) -> Guess:
@@ -27,15 +33,55 @@ def first_look(seen: Measured) -> Guess:
     ValueError
         Where no row says where the body is, or nothing fits.
     """
-    given = SimpleNamespace(model=SimpleNamespace(sensors=seen.sensors), stations=seen.stations, epoch=seen.epoch)
-    rows, _ = rows_of(given, seen.tracking, ask=False)
-    kept = first_stretch(rows, STRETCH)
-    coarse = replace(rows, sigma=np.where(rows.kind[:, None] == 3, np.hypot(rows.sigma, AIR), rows.sigma))
-    search = two_body_modes(coarse.of(kept), EARTH, motion=MOTION)
+    if seen.about == "sun":  # whose forces do not depend on the orbit
+        start = np.array([2.5 * ASTRONOMICAL_UNIT, 0.0, 0.0]), np.array([0.0, np.sqrt(SUN.mu / (2.5 * ASTRONOMICAL_UNIT)), 0.0])
+        return Guess(seen.epoch, *start, "initial orbits", about="sun")
+    rows = _plain(seen)
+    kept = first_stretch(rows, EARTH.stretch)
+    coarse = replace(rows, sigma=np.where(rows.kind[:, None] == DIRECTION, np.hypot(rows.sigma, AIR), rows.sigma))
+    search = two_body_modes(coarse.of(kept), EARTH.region, motion=MOTION)
     if not search.modes:
         raise ValueError(_nothing(len(kept)))
     best = search.modes[0].state
     return Guess(seen.epoch + search.epoch, best[:3], best[3:], "initial orbits")
+
+
+def _plain(seen: Measured) -> Rows:
+    return plain_rows(seen.sensors, seen.stations, seen.epoch, seen.tracking)[0]
+
+
+def goes_about_the_sun(seen: Measured) -> bool:
+    """Whether directions, slow among the stars, fit an orbit about the Sun and none about the Earth, which `seen` is about."""
+    if not {*seen.observations.kinds} & {"right_ascension"} or len(seen.tracking.times) < 3:
+        return False
+    rows = _plain(seen)
+    if not (rows.kind == DIRECTION).all() or not _slow(rows):
+        return False
+    epochs = [seen.epoch + float(t) for t in rows.t]
+    place, velocity = body("earth", epochs, "sun")
+    u = rows.value - barycentric_velocity(epochs) / SPEED_OF_LIGHT
+    moved = replace(
+        rows, observer=rows.observer + place, observer_velocity=rows.observer_velocity + velocity,
+        value=u / np.linalg.norm(u, axis=1)[:, None],
+    )  # fmt: skip
+    return _fits(moved, SUN) and not _fits(rows, EARTH)
+
+
+def _fits(rows: Rows, centre: Centre) -> bool:
+    """Whether a two-body orbit about a centre leaves residuals that are not many sigma."""
+    few = rows.of(first_stretch(rows, SUN.stretch))
+    search = two_body_modes(few, centre.region)
+    return any(m.admissible and m.square <= 2 * len(few) * FITS**2 for m in search.modes)
+
+
+def _slow(rows: Rows) -> bool:
+    """Whether it is never seen to move faster than `SLOW`."""
+    order = np.argsort(rows.t, kind="stable")
+    t, u = rows.t[order], rows.value[order]
+    dt = np.diff(t)
+    moved = np.linalg.norm(np.cross(u[1:], u[:-1]), axis=1)
+    sigma = np.hypot(*(rows.sigma[order][part].max(axis=1) for part in (slice(1, None), slice(None, -1))))
+    return bool((moved <= SLOW * dt + 5.0 * sigma).all())
 
 
 def unguided(seen: Measured, pose: Callable[[Guess], Problem]) -> Guess:
@@ -44,7 +90,8 @@ def unguided(seen: Measured, pose: Callable[[Guess], Problem]) -> Guess:
     best = found.modes[0]
     words = "the only orbit that fits" if len(found.modes) == 1 else f"the most probable of {len(found.modes)} orbits that fit"
     told = f"{words}, of {found.starts} starts"
-    return Guess(best.epoch, best.mean[:3], best.mean[3:], "initial orbits", (f"the fit begins at {told}",), found)
+    said = (f"the fit begins at {told}",)
+    return Guess(best.epoch, best.mean[:3], best.mean[3:], "initial orbits", said, found, seen.about)
 
 
 def _nothing(rows: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from math import ceil, log, sqrt
 from pathlib import Path
@@ -154,15 +154,20 @@ def read_forces(text: str, height: float) -> ForceChoice:
             )
         return _of_file(Path(text))
     base = _usual(height) if words[0] == "default" else {}
-    table: dict[str, Any] = {}
-    for word in words[words[0] == "default" :]:
+    return forces_of(named_values(words[words[0] == "default" :]), Path(), "as given", base)
+
+
+def named_values(words: Iterable[str]) -> dict[str, str]:
+    """NAME=VALUE of each word; raises ValueError for another."""
+    table: dict[str, str] = {}
+    for word in words:
         name, equals, value = word.partition("=")
         if not equals or not value:
             raise ValueError(f"forces: {word[:60]!r} is not NAME=VALUE")
         if name in table:
             raise ValueError(f"forces: {name} is given twice")
         table[name] = value
-    return forces_of(table, Path(), "as given", base)
+    return table
 
 
 def forces_of(

@@ -220,29 +220,38 @@ class Place(Tabulated):
 
     Parameters
     ----------
-    station : an `earth.Station`
+    station : an `earth.Station`; None is the centre of the Earth
     epoch : the instant of t = 0, that of the problem
     eop : orientation of the Earth; default the tables of the IERS
     tides : whether tides move it
+    about : "earth", or "sun" for where it is seen from the centre of the Sun (the Earth by its series, `SERIES_ERROR`)
     """
 
     TERMS: ClassVar[int] = STATION_TERMS
     LENGTH: ClassVar[float] = DAY / 6
     COLUMNS: ClassVar[int] = 6
 
-    station: Station
+    station: Station | None
     epoch: Epoch
     eop: Orientation | None = None
     tides: bool = True
+    about: str = "earth"
 
     @cached_property
     def checksum(self) -> str:
         """Hash of what the table is."""
-        of = self.station.coordinates, self.station.eccentricities, self.epoch.whole, self.epoch.fraction
-        return checksum("station", *of, orientation_key(self.eop), self.tides)
+        of = (self.station.coordinates, self.station.eccentricities) if self.station else ("centre of the Earth",)
+        about = () if self.about == "earth" else (self.about,)
+        return checksum("station", *of, self.epoch.whole, self.epoch.fraction, orientation_key(self.eop), self.tides, *about)
 
     def at(self, epochs: list[Epoch]) -> Array:
         """Positions at instants, (K, 3)."""
+        place = self._from_the_earth(epochs)
+        return place + body("earth", epochs, "sun")[0] if self.about == "sun" else place
+
+    def _from_the_earth(self, epochs: list[Epoch]) -> Array:
+        if self.station is None:
+            return np.zeros((len(epochs), 3))
         place = self.station.position(epochs)
         if self.tides:
             place = place + station_displacement(place, epochs, self.eop)

@@ -63,6 +63,7 @@ FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "IOD": Format(_in_columns(rb"[ \d]{5} [ \d]{2} [ \d]{3}[A-Z ]{3} \d{4} [A-Z] \d{8}[^\n]*"), tracking="visual:read_iod"),
     "UK": Format(_in_columns(rb"\d{5}\w{2}\d{10}[ \d]{15}[ \d][1-9][ \d]{8}[^\n]*"), tracking="visual:read_uk"),
     "RDE": Format(_in_columns(rb"\d{4} \d{4} \d\.\d{3} [ \d]{4}[ \r]*\n\d\d?"), tracking="visual:read_rde"),
+    "observatory": Format(_begins(rb"(?:#[^\n]*\n\s*)*OBSERVATIONS OF AN OBSERVATORY"), tracking="old_table:read"),
     "plain columns": Format(_PLAIN, tracking="plain:read"),
     "ADES": Format(_begins(rb"(?:[#!][^\n]*\n)*[^\n|]*\|(?:[^\n]*\|)?\s*obsTime\s*[|\n]"), tracking="ades:read_psv"),
     "ADES XML": Format(_root(rb"ades"), tracking="ades:read_xml"),

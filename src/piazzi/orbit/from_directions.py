@@ -105,6 +105,8 @@ def laplace(
 def distances(d1: float, d2: float, C: float, R2: float) -> Array:
     """Positive distances r, increasing, with r^2 = rho^2 + 2 C rho + R2 where rho = d1 + d2 / r^3: roots of degree 8."""
     unit = np.sqrt(R2)
+    if not unit > 0.0:  # who watches from the centre sees no parallax
+        return np.zeros(0)
     d1, d2, C = d1 / unit, d2 / unit**4, C / unit
     polynomial = np.array([1.0, 0.0, -(d1 * d1 + 2.0 * C * d1 + 1.0), 0.0, 0.0, -2.0 * d2 * (C + d1), 0.0, 0.0, -d2 * d2])
     roots = np.roots(polynomial)

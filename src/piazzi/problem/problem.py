@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from math import inf, isfinite
 from typing import Any
 
@@ -134,6 +135,25 @@ class Problem:
             getattr(self, name)
         for name in ("sensor", "noise", "correlated", "numbers"):
             getattr(self, f"station_{name}")
+
+    def to_toml(self, path: Any = None, times: Any = None) -> str:
+        """The whole problem as a scenario, every default spelled out, which every command and `load` take; returns the text.
+
+        Parameters
+        ----------
+        path : where it is written too, whole or not at all
+        times : (K,) s, when simulation of it measures; default an hour from the prior, every minute
+
+        Raises
+        ------
+        ValueError
+            For a problem that a file cannot hold, as one with functions that are known in Python only.
+        OSError
+            Where nothing can be written there.
+        """
+        files = import_module("piazzi.io.scenario_text")  # downstream of problems, which know nothing of files otherwise
+        text: str = files.scenario_text(self, times) if path is None else files.write_scenario(path, self, times)
+        return text
 
     @cached_property
     def mean(self) -> Array:

@@ -156,6 +156,7 @@ def write_place(place: Any) -> dict[str, Any]:
     if not isinstance(place, Place):
         raise ValueError(f"place {type(place).__name__} cannot be written to a file: it is known in Python only")
     station = place.station
+    assert station is not None, "scenarios have no station at the centre of the Earth"
     out: dict[str, Any] = {
         "kind": "station",
         "name": station.name,

@@ -36,14 +36,14 @@ if TYPE_CHECKING:
 
 FILES = Path(__file__).parent / "files"
 TEMPLATE = "template"
-MAX_BYTES = 2**18
+MAX_BYTES = 2**23  # a field of degree 120 in numbers, and the times of a week
 # TOML takes time in the square of the length of a dotted key
 _LONG_KEY = re.compile(rb"(?:[\w\"'-]{1,200}[ \t]{0,20}\.[ \t]{0,20}){30}")
 _PLACE = re.compile(r" \(at (line \d+, column \d+|end of document)\)$")
 SECTIONS = (
     "title", "epoch", "units", "earth", "states", "memory", "groups", "functions", "definitions", "roots", "events",
     "dynamics", "step", "parameters", "sensors", "stations", "prior", "process_noise", "gauss_markov", "integrator",
-    "manoeuvres", "times", "truth", "picture", "study", "recording",
+    "manoeuvres", "times", "truth", "picture", "study", "recording", "determine", "object", "product",
 )  # fmt: skip
 MAX_STEPS = 10**10
 MAX_ROWS = 2 * 10**7

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.beliefs import beliefs
-from piazzi.determination.guesses import MU
+from piazzi.determination.centres import EARTH
 from piazzi.earth import body, rotation
 from piazzi.orbit import state_axes
 from piazzi.problem.checks import Array
@@ -53,7 +53,7 @@ class Sampled:
         """Standard deviations (T, 6) of position and velocity along R, T and N."""
         known = self.measured
         out = np.full((len(self.times), 6), np.nan)
-        axes = state_axes(self.mean[known, :3], self.mean[known, 3:], "RTN", MU)
+        axes = state_axes(self.mean[known, :3], self.mean[known, 3:], "RTN", EARTH.mu)
         turned = axes @ self.covariance[known] @ np.swapaxes(axes, 1, 2)
         out[known] = np.sqrt(np.maximum(np.diagonal(turned, axis1=1, axis2=2), 0.0))
         return out
@@ -98,5 +98,5 @@ def fixed(position: Array, epochs: Any) -> tuple[Array, Array, Array]:
 
 def _period(state: Array, otherwise: float) -> float:
     """Of the ellipse that it is on."""
-    energy = 0.5 * float(state[3:] @ state[3:]) - MU / float(np.linalg.norm(state[:3]))
-    return float(2.0 * np.pi * np.sqrt((-0.5 * MU / energy) ** 3 / MU)) if energy < 0 else max(otherwise, 1.0)
+    energy = 0.5 * float(state[3:] @ state[3:]) - EARTH.mu / float(np.linalg.norm(state[:3]))
+    return float(2.0 * np.pi * np.sqrt((-0.5 * EARTH.mu / energy) ** 3 / EARTH.mu)) if energy < 0 else max(otherwise, 1.0)

@@ -79,6 +79,7 @@ def right_ascension_declination(
     biases: Mapping[str, str] | Sequence[str] = (),
     parameters: Mapping[str, str] | Sequence[str] = (),
     visible: Sequence[str] = (),
+    about: str = "earth",
 ) -> Instrument:
     """A sensor of right ascension and declination (rad), joint.
 
@@ -93,6 +94,7 @@ def right_ascension_declination(
         too
     name : of the sensor
     axes : the frame along whose axes they are: GCRF, EME2000, MOD, TOD, TEME, ...
+    about : "earth", or "sun" where states are about the Sun, and places of stations too (``earth.Place(..., about="sun")``)
     tag, steps, time_bias, biases, parameters, visible : as `azimuth_elevation` takes them
 
     Raises
@@ -101,9 +103,10 @@ def right_ascension_declination(
         For angles, axes or a tag that there are not.
     """
     one_of(angles, ANGLES, "angles")
+    one_of(about, ("earth", "sun"), "about")
     axes = frame_named(axes)
     ray = _seen(tag, steps, time_bias)
-    sight = _sight(ray, angles)
+    sight = _sight(ray, angles) if about == "earth" else _sight_from_the_sun(ray, angles)
     if axes != "GCRF":
         turn = "fixed" if axes == "ITRF" else f"to_{axes.lower()}"
         if axes != "ITRF":
@@ -141,6 +144,30 @@ def _sight(ray: Ray, angles: str) -> list[str]:
         "rest": f"sqrt(1 - ({dot('beta', 'beta')}))",
         "ahead": f"({dot('line', 'beta')})/(1 + rest)",
         **{f"sight_{a}": f"rest*line_{a} - ({rho} - ahead)*beta_{a}" for a in AXES},
+    }
+    return [f"sight_{a}" for a in AXES]
+
+
+def _sight_from_the_sun(ray: Ray, angles: str) -> list[str]:
+    """The same where states are about the Sun: its axes are those of the catalogues, so the line itself is astrometric.
+
+    The velocity of the Sun about the barycentre (15 m/s) is left out: 0.01 arcseconds of an apparent place, and 0.01 of where
+    the body was when it sent the light.
+    """
+    if angles == "astrometric":
+        return [f"line_{a}" for a in AXES]
+    rho, station = ray.light.legs[0].rho, ray.light.legs[0].station
+    if angles == "apparent":
+        beta = {f"beta_{a}": f"{component(f'{station}_v', a)}/{C}" for a in AXES}
+    else:
+        ray.makers["earth_velocity"] = earth_velocity
+        ray.definitions[names("sun_way")] = f"earth_velocity({ray.received})"
+        beta = {f"beta_{a}": f"sun_way_{a}/{C}" for a in AXES}
+    ray.definitions |= {
+        **beta,
+        "rest": f"sqrt(1 - ({dot('beta', 'beta')}))",
+        "ahead": f"({dot('line', 'beta')})/(1 + rest)",
+        **{f"sight_{a}": f"rest*line_{a} + ({rho} + ahead)*beta_{a}" for a in AXES},
     }
     return [f"sight_{a}" for a in AXES]
 

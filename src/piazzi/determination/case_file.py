@@ -1,0 +1,100 @@
+"""A case as a file: the sections [determine], [object] and [product] of a scenario, with [earth] for its forces."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from piazzi.determination.case import ANSWERS, OPTIONS, Case
+from piazzi.text import nearest, one_line
+
+SECTIONS = ("determine", "object", "product")
+ENDING = ".toml"
+LONGEST_PATH = 200
+
+
+def split(given: Sequence[Any]) -> tuple[list[Any], Case]:
+    """What is tracking, and the case that is among the files; an empty one where there is none.
+
+    Raises
+    ------
+    OSError
+        Where the case cannot be read.
+    ValueError
+        For what is wrong with it, with its place, and for two of them.
+    """
+    cases = [one for one in given if isinstance(one, str | os.PathLike) and os.fspath(one).lower().endswith(ENDING)]
+    if not cases:
+        return list(given), Case()
+    if len(cases) > 1:
+        raise ValueError(f"{os.fspath(cases[0])} and {os.fspath(cases[1])} are both cases: give one")
+    return [one for one in given if one is not cases[0]], read_case(cases[0])
+
+
+def read_case(path: str | os.PathLike[str]) -> Case:
+    """The case in a file; files that it names are looked for beside it first.  Raises OSError, ValueError."""
+    from piazzi.scenarios.loader import tables_of
+    from piazzi.scenarios.table import ScenarioError
+
+    name = os.fspath(path)
+    tables, faults = tables_of(path)
+    if faults:
+        raise ScenarioError(name, list(faults))
+    if not any(section in tables for section in SECTIONS):
+        raise ValueError(f"{name} is no case: it has no section [determine], [object] or [product] (stations: --stations)")
+    try:
+        return _told(tables, Path(name).parent)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def _told(tables: Mapping[str, Any], folder: Path) -> Case:
+    """The case that the sections say; raises ValueError."""
+    case = Case(forces=_forces(tables["earth"], folder, "[earth]")) if "earth" in tables else Case()
+    for section in SECTIONS:
+        given = tables.get(section, {})
+        if not isinstance(given, Mapping):
+            raise ValueError(f"{section}: must be a table")
+        known = keys(section)
+        for key, value in given.items():
+            name = known.get(key.replace("-", "_"))
+            if name is None:
+                raise ValueError(f"{section}.{one_line(key, 60)}: unknown key{nearest(key[:60], list(known))}")
+            try:
+                case = case.told({name: _beside(name, value, folder)}, f"{section}.{key}")
+            except TypeError:
+                raise ValueError(f"{section}.{key} is {one_line(repr(value), 60)}, which it cannot be") from None
+    return case
+
+
+def keys(section: str) -> dict[str, str]:
+    """Names of options by the keys of a section."""
+    if section == "determine":
+        own = [name for name, option in OPTIONS.items() if option.key and option.flags is not None]
+        return {name.rstrip("_"): name for name in [*own, *ANSWERS]}
+    return {option.section[1]: name for name, option in OPTIONS.items() if option.section and option.section[0] == section}
+
+
+def _beside(name: str, value: Any, folder: Path) -> Any:
+    """A value with files that are beside the case by their paths, and tables of forces read."""
+    if name == "forces" and isinstance(value, Mapping):
+        return _forces(value, folder, "the case")
+    if name not in OPTIONS or not OPTIONS[name].file:
+        return value
+    if isinstance(value, list):
+        return [_beside(name, one, folder) for one in value]
+    there = isinstance(value, str) and "\0" not in value and len(value) < LONGEST_PATH and (folder / value).is_file()
+    return str(folder / value) if there else value
+
+
+def _forces(table: Any, folder: Path, source: str) -> Any:
+    from piazzi.earth.defaults import forces_of
+
+    if not isinstance(table, Mapping):
+        raise ValueError(f"{source}: must be a table")
+    try:
+        return forces_of(table, folder, source)
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{source}: {error}") from None

@@ -1,0 +1,160 @@
+"""Cases of determinations: read, overridden, saved and run again; the problem as a scenario."""
+
+import json
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi.formats import Arc, Ephemeris, oem_text
+from tests.determination.fixing import EPOCH, truth
+
+T = np.arange(0.0, 43200.0, 900.0)
+CASE = """
+title = "a night"
+[determine]
+forces = "default"
+sigma = "5m"
+with = ["graph"]
+strict = true
+[object]
+name = "SAT"
+id = "1992-070B"
+norad = 22195
+mass = 405.4
+area = 0.283
+[product]
+originator = "OBS"
+frame = "EME2000"
+step = "10min"
+covariance_step = "1h"
+interpolation = "Lagrange 9"
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Fixes without sigmas, a case beside them."""
+    here = tmp_path_factory.mktemp("case")
+    states = truth(T)
+    noise = np.random.default_rng(5).standard_normal((len(T), 3))
+    said = {"frame": "GCRF", "centre": "EARTH", "scale": "UTC"}
+    arc = Arc(epoch=EPOCH, t=T, position=states[:, :3] + 5.0 * noise, velocity=states[:, 3:] + 1e3, name="SAT", **said)
+    (here / "one.oem").write_text(oem_text(Ephemeris(arcs=(arc,))))
+    (here / "case.toml").write_text(CASE)
+    return here
+
+
+def program(folder, *arguments, name="determine"):
+    return subprocess.run(
+        [sys.executable, "-m", "piazzi", name, *arguments], cwd=folder, capture_output=True, text=True, timeout=600
+    )
+
+
+def test_a_case_says_what_options_say_and_options_override_it(folder):
+    done = program(
+        folder, "case.toml", "one.oem", "--sigma", "1000m/s", "--sigma", "5m", "-o", "next.oem", "-o", "next.tle", "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["object"] == "SAT"
+    text = (folder / "next.oem").read_text()
+    for said in ("ORIGINATOR = OBS", "OBJECT_ID = 1992-070B", "REF_FRAME = EME2000", "INTERPOLATION = LAGRANGE", "DEGREE = 9"):
+        assert said in text
+    arc = pz.read_ephemeris(folder / "next.oem").arcs[0]
+    assert np.diff(arc.t[:-1]) == pytest.approx(600.0, abs=1e-6) and np.diff(arc.covariance_t[:-1]) == pytest.approx(3600.0)
+    assert all(np.linalg.eigvalsh(P)[0] > 0 for P in arc.covariance)
+    assert (folder / "next.tle").read_text().splitlines()[1].startswith("1 22195U 92070B")
+
+
+@pytest.mark.slow
+def test_a_saved_case_gives_the_same_bits(folder):
+    first = program(folder, "one.oem", "--sigma", "1000m/s", "--sigma", "5m", "--save", "saved.toml", "-o", "first.json")
+    assert first.returncode == 0, first.stderr
+    saved = tomllib.loads((folder / "saved.toml").read_text())
+    assert saved["determine"]["with"] == ["graph"] and saved["determine"]["forces"]["gravity"] == "EGM2008"
+    assert saved["determine"]["guess"] == "none" and saved["object"]["name"] == "SAT"
+    again = program(folder, "saved.toml", "one.oem", "-o", "again.json", "--save", "twice.toml")
+    assert again.returncode == 0, again.stderr
+    one, two = (json.loads((folder / name).read_text()) for name in ("first.json", "again.json"))
+    for key in (
+        "epoch",
+        "names",
+        "mean",
+        "sigma",
+        "covariance",
+        "residuals",
+        "rejected",
+        "elements",
+        "estimated",
+        "iterations",
+    ):
+        assert one[key] == two[key], key
+    twice = tomllib.loads((folder / "twice.toml").read_text())
+    assert twice["determine"].pop("output") == ["again.json"] and saved["determine"].pop("output") == ["first.json"]
+    assert twice == saved
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[determine]\ngues = 'x'", "case.toml: determine.gues: unknown key; did you mean 'guess'"),
+        ("[object]\nnme = 'x'", "object.nme: unknown key; did you mean 'name'"),
+        ("[product]\nstep = -3", "product.step is -3; it must be positive"),
+        ("[object]\nnorad = 'twelve'", "object.norad is 'twelve'; it is a whole number"),
+        ("[object]\nantenna = [1, 2]", "object.antenna is [1, 2]; it must be three numbers"),
+        ("[product]\ninterpolation = 'cubic'", "write Hermite, Lagrange or Linear"),
+        ("[determine]\nsave = 'x.toml'", "determine.save: unknown key"),
+        ("[determine]\nmass = [1]", "determine.mass"),
+        ("[determine]\nwith = 5", "determine.with"),
+        ("[determine]\nforces = { gravty = 'x' }", "gravty is not known"),
+        ("determine = 3", "determine: must be a table"),
+        ("[stations]", "is no case"),
+        ("[determine", "is not TOML"),
+    ],
+)
+def test_what_is_wrong_with_a_case_is_said_in_one_line(tmp_path, text, says):
+    (tmp_path / "case.toml").write_text(text)
+    done = program(tmp_path, "case.toml", "one.oem")
+    assert done.returncode == 2 and says in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["case.toml"], "there is no tracking"),
+        (["case.toml", "case2.toml", "one.oem"], "both cases"),
+        (["one.oem", "--save", "case.txt"], "--save case.txt: the file must end in .toml"),
+        (["one.oem", "--save", "nowhere/case.toml"], "no folder"),
+        (["one.oem", "-o", "one.oem"], "same file"),
+        (["one.oem", "-o", "a.oem", "--save", "one.oem"], "same file"),
+    ],
+)
+def test_what_cannot_be_written_or_read_is_refused_before_the_work(folder, arguments, says):
+    (folder / "case2.toml").write_text(CASE)
+    before = (folder / "one.oem").read_bytes()
+    done = program(folder, *arguments)
+    assert done.returncode == 2 and says in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+    assert (folder / "one.oem").read_bytes() == before
+
+
+@pytest.mark.slow
+def test_the_problem_is_a_scenario_that_other_commands_load(folder):
+    done = program(folder, "case.toml", "one.oem", "--sigma", "1000m/s", "--sigma", "5m", "-o", "problem.toml")
+    assert done.returncode == 0, done.stderr
+    problem, tracking = pz.load(folder / "problem.toml", seed=1)
+    assert problem.model.names[:6] == ("x", "y", "z", "vx", "vy", "vz") and len(tracking.times) == len(T)
+    found = pz.determine(folder / "case.toml", folder / "one.oem", sigma=["1000m/s", "5m"])
+    assert problem.mean.tolist() == found.problem.mean.tolist()
+    assert problem.covariance.tolist() == found.problem.covariance.tolist()
+    assert problem.checksums == found.problem.checksums and problem.model == found.problem.model
+    checked = program(folder, "check", "problem.toml", name="scenarios")
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+    compared = program(folder, "problem.toml", "--with", "graph", "--json", name="compare")
+    assert compared.returncode == 0, compared.stderr
+    again = program(folder, "problem.toml", "one.oem", "--json")
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["mean"] == found.to_dict()["mean"]

@@ -1,0 +1,235 @@
+"""Orbits about the Sun from directions: sensors by their laws, and Ceres as Piazzi saw it against JPL's orbit of today."""
+
+import erfa
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import piazzi as pz
+from piazzi import earth
+from piazzi.determination import measured
+from piazzi.determination.centres import EARTH, SUN
+from piazzi.determination.guesses import Guess
+from piazzi.determination.orbit import ECLIPTIC, Orbit
+from piazzi.determination.unguided import goes_about_the_sun
+from piazzi.formats import Observations, Segment, read_tracking
+from piazzi.orbit import propagate_kepler
+from piazzi.scenarios.loader import FILES
+
+LIGHT, AU = 299792458.0, 149597870700.0
+EPOCH = pz.Epoch("2015-03-01T00:00:00 TDB")
+SITE = earth.Station.geodetic("PALERMO", *np.radians([38.1117, 13.3578]), 72.0)
+STATE = np.array([1.1 * AU, 2.4 * AU, 0.9 * AU, -15.2e3, 6.1e3, 4.4e3])  # of a minor planet
+
+
+def line(t, station=SITE):
+    """Where light that is received at t comes from, by iteration, and the velocity of the station from the Sun."""
+    place = earth.Place(station, EPOCH, about="sun")
+    here, velocity = np.split(np.array(place.value(t)), 2)
+    tau = 0.0
+    for _ in range(6):
+        r = propagate_kepler(STATE[:3], STATE[3:], SUN.mu, t - tau)[0] - here
+        tau = np.linalg.norm(r) / LIGHT
+    return r, velocity
+
+
+def observations(angles="astrometric", frame="ICRF", days=(0, 1, 8, 20), noise=1e-7, seed=1, station="PALERMO", axes=None):
+    """Two rows a night, with noise (rad) on the sky."""
+    rng, t, value = np.random.default_rng(seed), [], []
+    for day in days:
+        at = 86400.0 * day + 600.0
+        u = line(at, SITE if station == "PALERMO" else None)[0]
+        u = u / np.linalg.norm(u) + noise * rng.normal(size=3)
+        u = u if axes is None else axes(at) @ u
+        u = u / np.linalg.norm(u)
+        t += [at, at]
+        value += [np.arctan2(u[1], u[0]) % (2 * np.pi), np.arcsin(u[2])]
+    return Observations(
+        epoch=EPOCH,
+        t=np.array(t),
+        value=np.array(value),
+        kinds=("right_ascension", "declination"),
+        kind=np.tile([0, 1], len(days)),
+        participants=(station, "A"),
+        station=0,
+        object=1,
+        segments=(Segment("UTC", frame=frame, angles=angles),),
+        sigma=max(noise, 1e-9),
+        tag=3,
+    )
+
+
+def test_a_station_is_where_the_earth_is_and_it_on_the_earth():
+    place = earth.Place(SITE, EPOCH, about="sun")
+    t = 4000.0
+    here = earth.body("earth", EPOCH + t, "sun")[0] + earth.Place(SITE, EPOCH).at([EPOCH + t])[0]
+    found = np.array(place.value(t))
+    assert_allclose(found[:3], here, atol=1e-3)
+    moved = np.array(place.value(t + 1.0))[:3] - np.array(place.value(t - 1.0))[:3]
+    assert_allclose(found[3:], moved / 2, atol=1e-3)
+    assert_allclose(earth.Place(None, EPOCH, about="sun").at([EPOCH])[0], earth.body("earth", EPOCH, "sun")[0], atol=1e-3)
+    assert earth.Place(SITE, EPOCH).checksum != place.checksum
+
+
+@pytest.mark.parametrize("angles", ["astrometric", "geocentric", "apparent"])
+def test_directions_are_those_of_light_that_was_sent_before(angles):
+    """Astrometric ones are the line; the others are turned by aberration, as ERFA has it."""
+    S = earth.sensors
+    sensor = S.right_ascension_declination(angles, about="sun")
+    forces = earth.Forces(about="sun", bodies=(), relativity=False)
+    place = earth.Place(SITE, EPOCH, about="sun")
+    problem = pz.Problem(
+        forces.model([sensor]),
+        pz.Gaussian(STATE, np.eye(6)),
+        stations=[pz.Station(**sensor.at(None, EPOCH, 1e-6, name="P", place=place))],
+        functions={**forces.functions(EPOCH), **sensor.functions(EPOCH)},
+        epoch=EPOCH,
+        prior_time=0.0,
+    )
+    t = 7200.0
+    x = np.concatenate(propagate_kepler(STATE[:3], STATE[3:], SUN.mu, t))
+    lon, lat = problem.measure("P", x, t)
+    found = np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+    r, velocity = line(t)
+    u = r / np.linalg.norm(r)
+    if angles != "astrometric":
+        if angles == "geocentric":
+            one, two = (EPOCH + t).jd("TDB")
+            velocity = np.asarray(erfa.epv00(one, two)[1]["v"]) * AU / 86400.0
+        beta = velocity / LIGHT
+        u = erfa.ab(u, beta, 1e9, np.sqrt(1 - beta @ beta))  # far from the Sun: without its potential
+    assert np.linalg.norm(found - u) < 1e-10
+
+
+def test_slow_directions_with_no_orbit_about_the_earth_are_about_the_sun():
+    assert goes_about_the_sun(measured(observations(), [SITE]))
+
+
+@pytest.mark.slow
+def test_so_they_are_of_the_geocentre_and_of_axes_of_date():
+    assert goes_about_the_sun(measured(observations(station="500"), None))
+    of_date = observations("astrometric", "TOD", axes=lambda t: earth.rotation("ICRF", "TOD", EPOCH + t))
+    assert goes_about_the_sun(measured(of_date, [SITE]))
+
+
+def test_what_moves_fast_or_is_measured_otherwise_is_about_the_earth():
+    rows = observations(days=(0, 1, 8, 20))
+    same = {name: getattr(rows, name) for name in ("epoch", "kinds", "kind", "participants", "segments", "value", "sigma")}
+    fast = Observations(**same, t=rows.t / 2e3, station=0, object=1, tag=3)
+    assert not goes_about_the_sun(measured(fast, [SITE]))
+
+
+def test_only_directions_are_taken_about_the_sun():
+    rows = observations()
+    ranges = Observations(
+        epoch=EPOCH, t=rows.t, value=np.abs(rows.value) * 1e9, kinds=("range",), kind=np.zeros(len(rows), int),
+        participants=("PALERMO", "A"), station=0, object=1, segments=(Segment("UTC", way="one-way"),), sigma=1.0, tag=3,
+    )  # fmt: skip
+    with pytest.raises(ValueError, match="range is not determined from about the Sun"):
+        measured(ranges, [SITE], about="sun")
+
+
+def test_guesses_are_about_their_centre():
+    with pytest.raises(ValueError, match="from the centre of the Earth, which is no orbit about it"):
+        Guess(EPOCH, STATE[:3], STATE[3:], "--guess")
+    given = Guess(EPOCH, STATE[:3], STATE[3:], "--guess", about="sun")
+    assert given.about == "sun"
+    text = "a=2.77au e=0.08 i=10deg raan=80deg argp=70deg M=10deg epoch=2015-03-01T00:00:00[TDB]"
+    with pytest.raises(ValueError, match="no orbit about it"):
+        pz.determine(observations(), guess=text.replace("[TDB]", "Z").replace("2.77au", "414e6km"), stations=[SITE])
+
+
+def test_elements_about_the_sun_are_those_of_the_ecliptic():
+    """The pole of the ecliptic is 23.44 degrees from that of the equator; along it nothing is inclined."""
+    tilt = np.radians(84381.448 / 3600.0)
+    v = np.sqrt(SUN.mu / AU) * np.array([0.0, np.cos(tilt), np.sin(tilt)])
+    bias = earth.rotation("EME2000", "GCRF", EPOCH)
+    mean = np.concatenate([bias @ [AU, 0.0, 0.0], bias @ v])
+
+    def beliefs(epochs):
+        return np.tile(mean, (len(epochs), 1)), np.tile(np.diag([1e6] * 3 + [1e-2] * 3), (len(epochs), 1, 1))
+
+    found = Orbit(EPOCH, "ICRF", beliefs, SUN).elements()
+    assert found["frame"] == ECLIPTIC
+    assert_allclose(found["mean"][0], AU, rtol=1e-9)
+    assert found["mean"][2] < 1e-9
+    assert Orbit(EPOCH, "GCRF", beliefs, EARTH).elements()["frame"] == "GCRF"
+
+
+def ceres_table():
+    return read_tracking(FILES / "ceres-1801.txt", sigma="5arcsec")
+
+
+def test_times_of_palermo_are_its_mean_time_from_noon():
+    rows = ceres_table()
+    hours = 8 + 43 / 60 + 17.8 / 3600  # after noon of 1 January, 13.3578 degrees east
+    jd = sum(rows.instant(0).jd("UT1"))
+    assert_allclose(jd, 2378862.0 + hours / 24 - 13.3578 / 360, atol=1e-8)
+    delta = sum(rows.instant(0).jd("TT")) - jd
+    assert_allclose(delta * 86400, 13.7, atol=1.0)
+
+
+def test_the_table_is_counted(data_dir):
+    """22 nights: one without a time, two declinations in minutes; and the numbers are those of the transcription."""
+    rows = ceres_table()
+    assert dict(rows.left_out) == {"declinations in minutes only": 2, "nights without a time": 1}
+    assert [int(rows.of_kind(kind).sum()) for kind in ("right_ascension", "declination")] == [21, 19]
+    print_ = [
+        line.split("\t") for line in (data_dir / "earth/ceres-1801/monatliche_correspondenz_1801.tsv").read_text().splitlines()
+    ]
+    hours = [float(cells[2]) for cells in print_ if cells[2].strip()]
+    assert_allclose(np.degrees(rows.value[rows.of_kind("right_ascension")]) / 15, hours, atol=1e-6)
+    whole = [float(cells[4]) for cells in print_ if cells[1].strip() and cells[4].strip()]
+    assert_allclose(np.degrees(rows.value[rows.of_kind("declination")]), whole, atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("station = Palermo\n", ""), "no line station"),
+        (("axes = TOD", "colour = red"), "'colour' is not known"),
+        (("from noon\n", "from midnight\n"), "'local mean time from noon' is known"),
+        (("03:27:11.25", "27:27:11.25"), "no sphere"),
+        (("08:43:17.8  ", ""), "cells"),
+        (("08:43:17.8", "08:73:17.8"), "time is"),
+    ],
+)
+def test_broken_tables_are_refused(tmp_path, change, says):
+    path = tmp_path / "table.txt"
+    path.write_text((FILES / "ceres-1801.txt").read_text().replace(*change))
+    with pytest.raises(ValueError, match=rf"table.txt: line \d+: .*{says}"):
+        read_tracking(path)
+
+
+def jpl(data_dir, name="ANSWER_ceres_heliocentric_jpl_sb441"):
+    """Cubic Hermite interpolation of JPL's daily states."""
+    table = np.loadtxt(data_dir / f"earth/ceres-1801/{name}.csv", delimiter=",", skiprows=1)
+
+    def at(epoch):
+        jd = sum(epoch.jd("TDB"))
+        k = int(np.searchsorted(table[:, 0], jd)) - 1
+        s, h = jd - table[k, 0], 86400.0
+        r0, r1, v0, v1 = (1e3 * table[i, c] for c in (slice(1, 4), slice(4, 7)) for i in (k, k + 1))
+        r = (1 + 2 * s) * (1 - s) ** 2 * r0 + s * (1 - s) ** 2 * h * v0 + s**2 * (3 - 2 * s) * r1 + s**2 * (s - 1) * h * v1
+        return np.concatenate([r, v0 + s * (v1 - v0)])
+
+    return at
+
+
+@pytest.mark.slow
+def test_an_orbit_about_the_sun_is_found_without_a_word(data_dir):
+    """Simulated without planets: the truth is within the covariance, in the axes and the scale that belong to the Sun."""
+    found = pz.determine(observations(days=(0, 1, 8, 20, 40), noise=5e-7), stations=[SITE], forces="none")
+    assert found.determined and found.setup.measured.about == "sun"
+    assert found.frame == "ICRF" and found.scale == "TDB"
+    truth = np.concatenate(propagate_kepler(STATE[:3], STATE[3:], SUN.mu, found.epoch - EPOCH))
+    off = found.orbit.at() - truth
+    assert off @ np.linalg.solve(found.orbit.covariance(), off) < 25.0
+    facts = found.to_dict()
+    assert facts["about"] == "sun" and facts["frame"] == "ICRF" and facts["epoch"].endswith("TDB")
+    arc = found.ephemeris(step=864000.0).arcs[0]
+    assert arc.centre == "SUN" and arc.frame == "ICRF"
+    with pytest.raises(ValueError, match="two lines of elements"):
+        found.write("x.tle")
+    again = pz.determine(observations(days=(0, 1, 8, 20, 40), noise=5e-7), stations=[SITE], forces="none", guess=facts)
+    assert_allclose(again.orbit.at(found.epoch), found.orbit.at(), rtol=1e-6)
