@@ -98,6 +98,48 @@ def test_only_another_model_compiles(tmp_path, monkeypatch, caplog):
             remembered.cache_clear()
 
 
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch):
+    """Compiled mode, with nothing compiled before."""
+    monkeypatch.setenv("PIAZZI_CACHE", str(tmp_path))
+    monkeypatch.delenv("PIAZZI_JIT", raising=False)
+    for remembered in (folder.private_folder, folder.writable_folder):
+        remembered.cache_clear()
+    yield tmp_path
+    for remembered in (folder.private_folder, folder.writable_folder):
+        remembered.cache_clear()
+
+
+def edited(own, sensor="place"):
+    """The problem with a drag of this text, and a sensor of this name."""
+    p = problem()
+    functions = dict(p.functions) | {"drag": pz.Function(own, 3, data=(1e-9, 5e4))}
+    model = replace(p.model, functions=functions, sensors=[pz.Sensor(sensor, ["x", "y", "z"])])
+    return replace(p, model=model, functions=functions, stations=[pz.Station("place", sensor, [25.0] * 3)])
+
+
+@pytest.mark.slow
+def test_an_edit_of_a_force_compiles_the_motion_once_for_all_estimators_and_nothing_of_theirs(empty_cache, caplog):
+    def compiled(p, *estimators):
+        tracking = pz.Tracking(times, np.tile(p.prior.mean[:3], (len(times), 1)), ["place"] * len(times))
+        with caplog.at_level(logging.INFO, "piazzi.kernels"):
+            caplog.clear()
+            for estimator in estimators:
+                estimator.estimate(p, tracking)
+        return sorted(record.getMessage().split()[1] for record in caplog.records)
+
+    times = 30.0 * np.arange(1.0, 40.0)
+    ekf, smoother, graph = pz.ExtendedKalmanFilter(), pz.Smoother(), pz.FactorGraph(max_iterations=1)
+    one = edited(OWN.replace("7e6", "6.8e6"))
+    assert compiled(one, ekf) == ["advance", "filter", "innovate"]
+    assert compiled(one, ekf, smoother) == ["smoother"]  # which is its algebra only
+    another = edited(OWN.replace("7e6", "6.9e6"))
+    assert compiled(another, ekf, smoother) == ["advance"]
+    assert compiled(another, ekf, smoother) == []
+    assert {"advance", "innovate"}.isdisjoint(compiled(another, graph))
+    assert compiled(edited(OWN.replace("7e6", "6.9e6"), sensor="fix"), ekf) == ["innovate"]  # another sensor, the same motion
+
+
 def _field():
     """A field of another name and radius."""
     from piazzi.earth.fields import gravity_field

@@ -54,6 +54,7 @@ class RootKernel:
         together = root.fragment == "root_unscented" and problem.moves_in_lanes
         parts = (
             "transition",
+            *(("step_lanes" if together else "step_alone",) if root.fragment == "root_unscented" else ()),
             problem.noise_fragment,
             "epoch_guarded",
             "semidefinite",

@@ -10,14 +10,15 @@ import os
 import threading
 import time
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
+from piazzi.kernels.apart import entry_name, symbol
 from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, live_entries, look_for_garbage, note_source, plain_entries
 from piazzi.kernels.folder import Folder, private_folder, writable_folder
-from piazzi.kernels.library import load_objects
+from piazzi.kernels.library import load_objects, say_where
 from piazzi.kernels.settings import may_be_kept
 from piazzi.kernels.spec import KernelSpec, fragment_file, tried
 
@@ -97,18 +98,31 @@ def _plain(spec: KernelSpec) -> SimpleNamespace:
 
 def _from_disk_or_built(spec: KernelSpec) -> SimpleNamespace:
     digest, (place, _) = spec.digest(), private_folder()
-    entries = _read(place, digest, spec.sizes) if place else None
+    entries = _read(place, digest, spec) if place else None
     if entries is None:
         home = writable_folder()
-        LOGGER.info("compiling %s for %s, once (about 3 to 15 s) ...", spec.fragments[-1], spec.subject)
+        LOGGER.info("compiling %s for %s, once (about 3 to 15 s) ...", spec.unit or spec.fragments[-1], spec.subject)
         started = time.perf_counter()
         entries = _build(spec, home, digest)
         LOGGER.debug("compiled in %.1f s into %s", time.perf_counter() - started, home and home.path / digest)
     return SimpleNamespace(**entries)
 
 
-def _read(place: Folder, digest: str, sizes: Mapping[str, int]) -> dict[str, Any] | None:
+class _Kept(NamedTuple):
+    """What a finished folder holds: object files, their symbols with what they take, and the units that they call."""
+
+    objects: dict[str, bytes]
+    symbols: dict[str, tuple[str, tuple[str, ...]]]
+    calls: list[str]
+
+
+def _read(place: Folder, digest: str, spec: KernelSpec) -> dict[str, Any] | None:
     """Entries of a finished folder, or None where something is missing, truncated, altered or not ours."""
+    kept = _kept(place, digest)
+    return None if kept is None else _bound(spec, kept)
+
+
+def _kept(place: Folder, digest: str) -> _Kept | None:
     try:
         with place.inside(digest) as home:
             manifest = json.loads(home.read(MANIFEST))
@@ -120,30 +134,49 @@ def _read(place: Folder, digest: str, sizes: Mapping[str, int]) -> dict[str, Any
         symbols = {name: (symbol, tuple(kinds)) for name, (symbol, kinds) in manifest["symbols"].items()}
         if manifest["seal"] != _seal(manifest, digest):
             return None
+        return _Kept(objects, symbols, manifest["calls"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
-    return dict(load_objects(objects, symbols, sizes))
+
+
+def _bound(spec: KernelSpec, kept: _Kept) -> dict[str, Any]:
+    """Entries of object code, whose calls of other modules go to those of this specification's model."""
+    _bind(spec, kept.calls)
+    return dict(load_objects(kept.objects, kept.symbols, spec.sizes))
+
+
+def _bind(spec: KernelSpec, calls: Iterable[str]) -> None:
+    """Load the modules that are called, and tell where they are: what is loaded next finds them."""
+    found = [(unit, load(spec.module_of(unit))) for unit in calls]  # each may tell of its own
+    for unit, module in found:
+        say_where(symbol(unit), getattr(module, entry_name(unit)).address)
 
 
 def _seal(manifest: dict[str, Any], digest: str) -> str:
     """Checksum of the manifest itself, and of whose it is: its symbols and kinds decide how the code is called."""
-    body = json.dumps([digest, manifest["objects"], manifest["symbols"]], sort_keys=True)
+    body = json.dumps([digest, manifest["objects"], manifest["symbols"], manifest["calls"]], sort_keys=True)
     return hashlib.sha256(body.encode()).hexdigest()
 
 
 def _build(spec: KernelSpec, place: Folder | None, digest: str) -> dict[str, Any]:
     """Compile, and keep what came of it where that can be done."""
-    source = spec.source("compiled")
+    source, calls = spec.parts("compiled")
     try:
-        objects, symbols = compile_entries(source)
+        kept = _Kept(*compile_entries(source), calls)
     except UNKNOWN_INSIDE as error:
+        _bind(spec, calls)
         return _built_publicly(source, spec.sizes, error)
-    if place is not None and may_be_kept():
-        try:
-            _keep(place, digest, source, objects, symbols)
-        except OSError as error:  # a full disk: the code is here, and is made again next time
-            LOGGER.info("kernels are not kept in %s: %s", place.path, error.strerror or error)
-    return dict(load_objects(objects, symbols, spec.sizes))
+    _keep_where_possible(place, digest, source, kept)
+    return _bound(spec, kept)
+
+
+def _keep_where_possible(place: Folder | None, digest: str, source: str, kept: _Kept) -> None:
+    if place is None or not may_be_kept():
+        return
+    try:
+        _keep(place, digest, source, kept)
+    except OSError as error:  # a full disk: the code is here, and is made again next time
+        LOGGER.info("kernels are not kept in %s: %s", place.path, error.strerror or error)
 
 
 def _built_publicly(source: str, sizes: Mapping[str, int], error: Exception) -> dict[str, Any]:
@@ -168,18 +201,19 @@ def _warn_of_numba(why: str) -> None:
     )
 
 
-def _keep(place: Folder, digest: str, source: str, objects: dict[str, bytes], symbols: dict[str, Any]) -> None:
+def _keep(place: Folder, digest: str, source: str, kept: _Kept) -> None:
     """Write into a folder of our own and move that into place: two processes may do so at once."""
     with contextlib.suppress(OSError):
         _sweep(place)
     with place.new(".building-") as (work, home):
         try:
             home.write("kernels.py", source.encode())
-            for name, code in objects.items():
+            for name, code in kept.objects.items():
                 home.write(f"{name}.o", code)
             manifest: dict[str, Any] = {
-                "objects": {n: hashlib.sha256(c).hexdigest() for n, c in objects.items()},
-                "symbols": symbols,
+                "objects": {n: hashlib.sha256(c).hexdigest() for n, c in kept.objects.items()},
+                "symbols": kept.symbols,
+                "calls": kept.calls,
             }
             seal = _seal(json.loads(json.dumps(manifest)), digest)
             home.write(MANIFEST, json.dumps(manifest | {"seal": seal}).encode())
@@ -208,7 +242,7 @@ def _move(place: Folder, work: str, digest: str) -> None:
             place.rename(work, digest)
             return
         except OSError:
-            if _read(place, digest, {}) is not None:
+            if _kept(place, digest) is not None:
                 return
             aside = f".damaged-{os.urandom(4).hex()}"
             with contextlib.suppress(OSError):

@@ -79,6 +79,11 @@ def entry(function: Callable[..., Any]) -> Any:
     return cfunc(types.void(*(_SCALARS.get(k, k) for k in kinds)), **entry_options(), **OPTIONS)(function)
 
 
+def external(symbol: str, *kinds: Any) -> Any:
+    """A function of C's calling convention that has its address when the code is loaded."""
+    return types.ExternalFunction(symbol, types.void(*(_SCALARS.get(k, k) for k in kinds)))
+
+
 unless_missing = inline(_unless_missing)
 
 

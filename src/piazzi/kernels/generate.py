@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 from piazzi.kernels.multistep import multistep_source
 from piazzi.kernels.printer import function, in_time
 from piazzi.kernels.quadrature import rule_source
+from piazzi.kernels.sizes import ROWS, sizes_source
 from piazzi.kernels.steps import adaptive_source, axes_source, kepler_source, runge_kutta_source
 from piazzi.kernels.steps import inline_source as _inline
 from piazzi.kernels.tableaus import DORMAND_PRINCE_8
@@ -44,23 +45,7 @@ _BRANCHING = re.compile(r"(?<![\w.])(sin|cos|tan|exp|log)\(")
 
 def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
     """Source of the sizes, dynamics, step and sensors; `lanes` problems are worked on at once where there are that many."""
-    sizes = {
-        "LANES": lanes,
-        "ND": len(model.moving),
-        "N": model.n,
-        "M": model.width,
-        "MN": model.width * model.n,
-        "NN": model.n**2,
-        "M_LANES": model.width * lanes,
-        "N_LANES": model.n * lanes,
-        "MN_LANES": model.width * model.n * lanes,
-        "NN_LANES": model.n**2 * lanes,
-        "WORK": model.width * (model.width + model.n),
-        "NUMBERS": model.most_numbers,
-        "FEW_DIGITS": 1e8,
-        "LOST": 1e-15 * max(model.n, 4),  # of a diagonal: what is left below it is rounding
-    }
-    parts = ["".join(f"{k} = {v}\n" for k, v in sizes.items()), "\n\n", _identity_source(model), axes_source(model)]
+    parts = [sizes_source(model, lanes), _identity_source(model), axes_source(model)]
     parts.append(outside_source(model))
     if not model.discrete:
         parts.append(_dynamics_source(model))
@@ -337,8 +322,7 @@ def _sensor_source(model: Model) -> str:
         "".join(functions)
         + _inline("measure_into(sensor, t, x, p, s, at, out, row)", *measure)
         + _inline("innovate(sensor, t, x, p, s, at, z, row, nu, H, out)", *innovate)
-        + _inline("measure_row(measured, row, t, x, p, out, at)", *_of_row("measure_into", "out, at"))
-        + _inline("innovate_row(measured, row, t, x, p, nu, H, out)", *_of_row("innovate", "measured.z, row * M, nu, H, out"))
+        + ROWS
         + _inline("measure_lanes(sensor, t, x, p, s, at, h)", *measure_lanes)
         + _inline("innovate_lanes(sensor, t, x, p, s, at, z, nu, H)", *innovate_lanes)
     )
@@ -351,9 +335,3 @@ def _on_sky(sensor: Sensor, i: int, measured: str) -> tuple[str, list[str]]:
         return "", []
     z = measured.format(partner)
     return f"scale{i}*", [f"    scale{i} = cos(choose(10.0, fabs({z}), {z}, h{partner}))"]
-
-
-def _of_row(function: str, rest: str) -> tuple[str, str]:
-    """The same for a row, by its station."""
-    numbers = "measured.numbers, s * NUMBERS"
-    return "s = measured.station[row]", f"{function}(measured.sensor[s], t, x, p, {numbers}, {rest})"

@@ -77,6 +77,7 @@ class Entry(_Callable):
         super().__init__(name, signature, sizes)
         self._seen = set[tuple[Any, ...]]()  # what has been checked: kinds of bundles, shapes, whole numbers
         self._loose = [(i, TYPES[slot.kind]) for i, slot in enumerate(self._slots) if slot and slot.kind in TYPES]
+        self.address = address
         self._call = ctypes.CFUNCTYPE(None, *(_C_TYPES[k] for k in flat(signature)))(address)
         self._keep = keep  # the code lives as long as something can call it
 
@@ -176,6 +177,14 @@ def machine_options() -> dict[str, Any]:
     reloc = "static" if family.startswith("x86") else "pic" if family.startswith("ppc") else "default"
     cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
     return {"cpu": cpu, "features": features, "opt": 3, "reloc": reloc, "codemodel": "jitdefault", "jit": True}
+
+
+def say_where(symbol: str, address: int) -> None:
+    """Tell code that is loaded from now on where a function is that it calls."""
+    import llvmlite.binding as llvm
+
+    _prepare()
+    llvm.add_symbol(symbol, address)
 
 
 def load_objects(

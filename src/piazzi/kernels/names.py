@@ -15,8 +15,8 @@ FRAGMENTS = Path(__file__).parent / "fragments"
 MOST_TEXTS = 200  # parts that are remembered, for other modules that have them too
 
 
-def check_names(parts: Mapping[str, str]) -> None:
-    """Check the parts of a module, by name, against each other and the vocabulary of kernels.
+def check_names(parts: Mapping[str, str]) -> tuple[str, ...]:
+    """Check the parts of a module, by name, against each other and the vocabulary of kernels; the functions that are reached.
 
     Raises
     ------
@@ -36,10 +36,12 @@ def check_names(parts: Mapping[str, str]) -> None:
             home[name] = part
         functions |= inside
     known = home.keys() | vars(plain).keys() | vars(builtins).keys()
-    for function in _reached(functions):
+    reached = tuple(_reached(functions))
+    for function in reached:
         for name in sorted(functions[function].needs - known):
             where = f"kernel fragment {home[function]!r}: {function!r}"
             raise ValueError(f"{where} needs {name!r}, which no part of the kernel defines{_elsewhere(name)}")
+    return reached
 
 
 class _Function(NamedTuple):

@@ -160,6 +160,7 @@ weigh_dynamics: Any
 # written in fragments/*_lanes.py
 propagate_lanes: Any
 transition_lanes: Any
+transition_each: Any
 ones: Any
 store_errors: Any
 squared_lanes: Any

@@ -11,7 +11,9 @@ import numpy as np
 from piazzi import kernels
 from piazzi.expressions import evaluate
 from piazzi.kernels import Integrator, KernelSpec
+from piazzi.kernels.apart import Apart
 from piazzi.kernels.bundle import Given
+from piazzi.kernels.spec import outside_fragments
 from piazzi.model import Model
 from piazzi.model.functions import ROOT, STATION
 from piazzi.model.values import with_values
@@ -166,15 +168,36 @@ def fragments_of(
     the axes of the noise, its integration and the same; "linearize_scaled" is replaced where states cannot be worked on
     together; that and "chain_noise_scaled" where the noise is not a multiple of one matrix.
     """
-    events = "_manoeuvres" if manoeuvres else ""
-    moved, noisy = cut_at_events(model, integrator.fragments), cut_at_events(model, integrator.noise_fragments)
-    turned = "axes_orbit" if axes == "orbit" else "axes"
-    linearize = "linearize_integral" if noise_varies else "linearize_scaled" if in_lanes else "linearize_each"
-    parts = {
-        "transition": ("matrices", *moved, f"transition{events}"),
-        "noise_scaled": (turned, "noise_scaled", f"advance{events}"),
-        "noise_integral": (turned, *noisy, f"advance{events}"),
-        "linearize_scaled": (linearize,),
+    parts = _parts_of(model, integrator, manoeuvres=manoeuvres, axes=axes)
+    linearize = ("linearize_integral",) if noise_varies else ("linearize_each",)
+    parts |= {
+        "linearize_scaled": ("step_lanes", "linearize_scaled") if in_lanes and not noise_varies else linearize,
         "chain_noise_scaled": (f"chain_noise_{'integral' if noise_varies else 'scaled'}",),
     }
     return tuple(part for name in fragments for part in parts.get(name, (name,)))
+
+
+def _parts_of(model: Model, integrator: Integrator, *, manoeuvres: bool, axes: str) -> dict[str, tuple[str, ...]]:
+    """The fragments of the motion and of its noise."""
+    events = "_manoeuvres" if manoeuvres else ""
+    moved, noisy = cut_at_events(model, integrator.fragments), cut_at_events(model, integrator.noise_fragments)
+    turned = "axes_orbit" if axes == "orbit" else "axes"
+    return {
+        "transition": ("matrices", *moved, f"transition{events}"),
+        "noise_scaled": (turned, "noise_scaled", f"advance{events}"),
+        "noise_integral": (turned, *noisy, f"advance{events}"),
+    }
+
+
+WHOLE = ("rates",)  # fragments that work on the equations themselves
+
+
+def apart_of(model: Model, fragments: tuple[str, ...], integrator: Integrator, *, manoeuvres: bool, axes: str) -> Apart | None:
+    """What is compiled apart from a kernel of these fragments; None for models without functions from outside."""
+    if not model.reads_data or not {*WHOLE}.isdisjoint(fragments):
+        return None
+    parts = _parts_of(model, integrator, manoeuvres=manoeuvres, axes=axes)
+    kind = next((name for name in ("noise_scaled", "noise_integral") if name in fragments), "")
+    at_end = kind == "noise_scaled" and not manoeuvres
+    axes = parts[kind][0] if at_end else ""
+    return Apart(outside_fragments(model), parts["transition"], parts.get(kind, ()), axes)

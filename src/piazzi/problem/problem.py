@@ -275,16 +275,13 @@ class Problem:
         key = (fragments, lanes)
         spec = self.specs.get(key)
         if spec is None:
+            about = {"manoeuvres": bool(self.manoeuvres), "axes": self.process_noise.axes}
+            together = self.moves_in_lanes and lanes > 1
             parts = outside_fragments(self.model) + evaluation.fragments_of(
-                self.model,
-                fragments,
-                self.integrator,
-                manoeuvres=bool(self.manoeuvres),
-                axes=self.process_noise.axes,
-                noise_varies=self.noise_varies,
-                in_lanes=self.moves_in_lanes and lanes > 1,
+                self.model, fragments, self.integrator, **about, noise_varies=self.noise_varies, in_lanes=together
             )
-            spec = self.specs[key] = KernelSpec(self.model, self.integrator.scheme, parts, lanes)
+            apart = evaluation.apart_of(self.model, fragments, self.integrator, **about)
+            spec = self.specs[key] = KernelSpec(self.model, self.integrator.scheme, parts, lanes, apart)
         return spec
 
     @cached_property

@@ -1,7 +1,7 @@
 """The extended Kalman filter over `LANES` runs together, which share times, stations and what is missing (nothing)."""
 
-from piazzi.kernels.fragments.score_lanes import nees_lanes, squared_lanes, store_errors
-from piazzi.kernels.fragments.step_lanes import ones, transition_lanes
+from piazzi.kernels.fragments.score_lanes import nees_lanes, ones, squared_lanes, store_errors
+from piazzi.kernels.fragments.step_lanes import transition_lanes
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

@@ -1,5 +1,6 @@
 """Linearised dynamics of a stretch of states, `LANES` states at a time; process noise is a multiple of one matrix."""
 
+from piazzi.kernels.fragments.step_lanes import transition_each
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
@@ -17,13 +18,11 @@ def linearize_dynamics(a, W, run, chain, p):
                     together = 0
         if together:
             start = load_lanes(t, k, 1, 1, LANES)[0]
-            h = (load_lanes(t, k + 1, 1, 1, LANES)[0] - start) / count[k + 1]
-            y, R = substep_jacobian(start, h, remember(load_lanes(chain.x, k * N, N, N, LANES)), first_rows(), p)
-            for i in range(1, count[k + 1]):
-                y, R = substep_jacobian(start + i * h, h, y, R, p)
-            one = 1.0 + 0.0 * h  # in every lane: where nothing depends on the states, y and R have a single lane
+            dt = load_lanes(t, k + 1, 1, 1, LANES)[0] - start
+            y, Phi = transition_each(start, dt, count[k + 1], load_lanes(chain.x, k * N, N, N, LANES), p)
+            one = 1.0 + 0.0 * dt  # in every lane: where nothing depends on the states, y and Phi have a single lane
             store_lanes(chain.f, j * N, N, one * y)
-            store_lanes(chain.Phi, j * N * N, N * N, one * complete(R))
+            store_lanes(chain.Phi, j * N * N, N * N, one * Phi)
             j += LANES
         else:
             y_one, Phi_one = transition(t[k], t[k + 1] - t[k], count[k + 1], load_vector(chain.x, k * N, N), p)

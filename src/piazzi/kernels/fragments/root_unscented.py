@@ -11,6 +11,7 @@ central point's, wrapped.  Points are drawn anew after process noise was added: 
 """
 
 from piazzi.kernels.fragments.semidefinite import root_of
+from piazzi.kernels.fragments.step_lanes import propagate_lanes
 from piazzi.kernels.fragments.triangle import keep_root, triangularize_rows
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
@@ -35,7 +36,7 @@ def propagate_points(run, k, before, x, p, root):
     dt, count = run.t[k] - before, run.count[k]
     for g in range(groups):
         at = g * LANES * N
-        store_lanes(points, at, N, propagate(before, dt, count, load_lanes(points, at, N, N, LANES), p))
+        store_lanes(points, at, N, propagate_lanes(before, dt, count, load_lanes(points, at, N, N, LANES), p))
 
 
 @inline

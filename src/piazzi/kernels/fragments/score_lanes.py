@@ -4,6 +4,14 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
+def ones():
+    """1.0 in every lane."""
+    one = scratch(1)
+    one[0] = 1.0
+    return load_lanes(one, 0, 1, 0, LANES)[0]
+
+
+@inline
 def store_errors(e, P, own):
     """Errors, covariances and variances into work space, entry by entry."""
     store_packs(own.e, 0, e, LANES)

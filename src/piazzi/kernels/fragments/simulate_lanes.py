@@ -1,6 +1,7 @@
 """Draw truths and their measurements, `LANES` runs together: what `simulate` does, with process noise of one shape."""
 
-from piazzi.kernels.fragments.step_lanes import ones, propagate_lanes
+from piazzi.kernels.fragments.score_lanes import ones
+from piazzi.kernels.fragments.step_lanes import propagate_lanes
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 

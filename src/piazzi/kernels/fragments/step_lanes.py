@@ -4,14 +4,6 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
 @inline
-def ones():
-    """1.0 in every lane."""
-    one = scratch(1)
-    one[0] = 1.0
-    return load_lanes(one, 0, 1, 0, LANES)[0]
-
-
-@inline
 def propagate_lanes(t, dt, count, x, p):
     """The states `dt` seconds later."""
     h = dt / count
@@ -29,3 +21,9 @@ def transition_lanes(t, dt, count, x, p):
     for i in range(1, count):
         y, R = substep_jacobian(t + i * h, h, y, R, p)
     return y, complete(R)
+
+
+@inline
+def transition_each(t, dt, count, x, p):
+    """The same from a time of its own in every lane, over an interval of its own."""
+    return transition_lanes(t, dt, count, x, p)
