@@ -50,6 +50,14 @@ def graph_fragments(problem: Problem) -> tuple[str, ...]:
     return ("graph_linearize", "graph_weigh") if problem.noise_varies else ("graph_linearize",)
 
 
+def chain_spec(problem: Problem, dynamics: str = "") -> KernelSpec:
+    """The kernels that linearise a chain, by this fragment where one is given."""
+    fragments = chain_fragments(problem, *graph_fragments(problem))
+    if dynamics:
+        fragments = tuple(dynamics if name.startswith("linearize_") else name for name in fragments)
+    return problem.spec(*fragments, lanes=lanes_for(problem.model.n))
+
+
 ROUNDING = 4 * float(np.finfo(float).eps)
 
 
@@ -80,10 +88,7 @@ class Chain:
 
     def __init__(self, problem: Problem, inputs: Inputs) -> None:
         self.problem, self.inputs = problem, inputs
-        fragments = chain_fragments(problem, *graph_fragments(problem))
-        if self.dynamics:
-            fragments = tuple(self.dynamics if name.startswith("linearize_") else name for name in fragments)
-        self.library = kernels.load(problem.spec(*fragments, lanes=lanes_for(problem.model.n)))
+        self.library = kernels.load(chain_spec(problem, self.dynamics))
         K, N, M = inputs.epochs, problem.model.n, problem.model.width
         J, A, varies = len(inputs.z), inputs.most_rows * M + N, problem.noise_varies
         self.linear = bundle.Chain.empty(X=K, C=K, N=N, L=K if varies else 1, B=J, M=M, A=A)

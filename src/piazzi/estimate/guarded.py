@@ -13,6 +13,7 @@ from piazzi import kernels
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.live import LiveFilter, checked_measurement
 from piazzi.estimate.saved import Saved
+from piazzi.kernels import KernelSpec
 from piazzi.kernels.bundle import Beliefs, Gate, Innovations
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, frozen
@@ -49,13 +50,17 @@ def _thresholds(gate: float | None, width: int) -> Array:
 
 def guarded_run(problem: Problem, inputs: Inputs, fragments: tuple[str, ...], guard: Guard) -> tuple[Array, ...]:
     """Means (K, n), covariances (K, n, n), innovations (J, m) with theirs (J, m, m), and 1 for each row rejected, (J,)."""
-    parts = ("transition", problem.noise_fragment, *fragments, "epoch_guarded", "filter_guarded")
-    library = kernels.load(problem.spec(*parts))
+    library = kernels.load(guarded_spec(problem, fragments))
     K, n, (J, m) = inputs.epochs, problem.model.n, inputs.z.shape
     beliefs, innovations = Beliefs.empty(K=K, N=n), Innovations.empty(J=J, M=m)
     gate = guard.bundle(J, m)
     library.run_guarded_filter(*inputs.bundles(problem), gate, beliefs, innovations)
     return (*beliefs.members, *innovations.members, gate.rejected)
+
+
+def guarded_spec(problem: Problem, fragments: tuple[str, ...]) -> KernelSpec:
+    """The module of a problem's guarded filter, with these fragments of the update."""
+    return problem.spec("transition", problem.noise_fragment, *fragments, "epoch_guarded", "filter_guarded")
 
 
 class GuardedLiveFilter(LiveFilter):

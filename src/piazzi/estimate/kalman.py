@@ -19,6 +19,7 @@ from piazzi.estimate.live import LiveFilter
 from piazzi.estimate.root import linear_root, root_estimate
 from piazzi.estimate.soundness import check_start
 from piazzi.estimate.width import TOO_WIDE, too_wide
+from piazzi.kernels import KernelSpec
 from piazzi.kernels.bundle import Belief, Beliefs, Innovations
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
@@ -123,12 +124,7 @@ class ExtendedKalmanFilter:
 
 def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tuple[Array, Array, Array, Array, float]:
     """Means (K, n), covariances (K, n, n), innovations (J, m), their covariances (J, m, m), and the seconds it took."""
-    kind = update, problem.noise_fragment, problem.is_correlated
-    spec = problem.specs.get(kind)
-    if spec is None:
-        fragments = ("transition", problem.noise_fragment, *update_fragments(problem, update), "filter")
-        spec = problem.specs[kind] = problem.spec(*fragments)
-    library = kernels.load(spec)
+    library = kernels.load(filter_spec(problem, update))
     K, n, (J, m) = len(inputs.t), len(problem.mean), inputs.z.shape
     beliefs, innovations = Beliefs.empty(K=K, N=n), Innovations.empty(J=J, M=m)
     started = time.perf_counter()
@@ -138,6 +134,16 @@ def filter_run(problem: Problem, inputs: Inputs, update: Update = "auto") -> tup
     if not isfinite(mean.item(0)):  # a failed update leaves no number of the state
         check_start(problem, inputs, mean[0])
     return mean, P, nu, S, seconds
+
+
+def filter_spec(problem: Problem, update: Update = "auto") -> KernelSpec:
+    """The module of a problem's filter."""
+    kind = update, problem.noise_fragment, problem.is_correlated
+    spec = problem.specs.get(kind)
+    if spec is None:
+        fragments = ("transition", problem.noise_fragment, *update_fragments(problem, update), "filter")
+        spec = problem.specs[kind] = problem.spec(*fragments)
+    return spec
 
 
 @dataclass(frozen=True, eq=False)

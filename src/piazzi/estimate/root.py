@@ -13,6 +13,7 @@ from piazzi import kernels
 from piazzi.estimate.estimator import Estimate, Stopwatch
 from piazzi.estimate.guarded import Guard
 from piazzi.estimate.soundness import check_start
+from piazzi.kernels import KernelSpec
 from piazzi.kernels.bundle import Beliefs, Gate, Innovations, JointRoot, Measured, RootForm, Run
 from piazzi.kernels.spec import machine_lanes
 from piazzi.problem import Problem, Tracking
@@ -41,6 +42,23 @@ class Root:
     eta: float = 0.0
     share: float = 0.0
 
+    def spec(self, problem: Problem) -> KernelSpec:
+        """The module of a problem's filter."""
+        points = self.fragment == "root_unscented"
+        together = points and problem.moves_in_lanes
+        parts = (
+            "transition",
+            *(("step_lanes" if together else "step_alone",) if points else ()),
+            problem.noise_fragment,
+            "epoch_guarded",
+            "semidefinite",
+            "triangle",
+            self.fragment,
+            "root",
+            "filter_root",
+        )
+        return problem.spec(*parts, lanes=machine_lanes() if together else 1)
+
     def kernel(self, problem: Problem) -> RootKernel:
         """The compiled filter of a problem."""
         return RootKernel(self, problem)
@@ -51,19 +69,7 @@ class RootKernel:
 
     def __init__(self, root: Root, problem: Problem) -> None:
         self.problem, n, m = problem, problem.model.n, problem.model.width
-        together = root.fragment == "root_unscented" and problem.moves_in_lanes
-        parts = (
-            "transition",
-            *(("step_lanes" if together else "step_alone",) if root.fragment == "root_unscented" else ()),
-            problem.noise_fragment,
-            "epoch_guarded",
-            "semidefinite",
-            "triangle",
-            root.fragment,
-            "root",
-            "filter_root",
-        )
-        self._library = kernels.load(problem.spec(*parts, lanes=machine_lanes() if together else 1))
+        self._library = kernels.load(root.spec(problem))
         self._limits = Guard(1, root.gate).thresholds(m)
         A = root.unknowns * n
         self._root = RootForm(

@@ -13,9 +13,10 @@ from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate, Stopwatch, View
 from piazzi.estimate.gradients import told_of
 from piazzi.estimate.live_window import LiveWindow, window_opens
-from piazzi.estimate.losses import loss_of
+from piazzi.estimate.losses import Loss, loss_of
 from piazzi.estimate.robust_window import loss_numbers, window_fragments
 from piazzi.estimate.width import NOT_BORDERED, TOO_WIDE, last_wide, too_wide, undetermined
+from piazzi.kernels import KernelSpec
 from piazzi.kernels.bundle import Beliefs, Chain, Innovations, Window
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
@@ -127,7 +128,7 @@ class SlidingWindow:
         self, problem: Problem, inputs: Inputs, begin: Array, weights: Array, prior_mean: Array, prior_covariance: Array
     ) -> WindowRun:
         """The window over these epochs, begun at a prior."""
-        library = kernels.load(problem.spec(*window_fragments(problem, self.loss, "window"), lanes=lanes_for(problem.model.n)))
+        library = kernels.load(window_spec(problem, self.loss))
         K, N, (J, M) = inputs.epochs, problem.model.n, inputs.z.shape
         chain = window_chain(problem, inputs, begin, loss_numbers(problem, self.loss), weights)
         window = Window(
@@ -208,3 +209,8 @@ def window_chain(problem: Problem, inputs: Inputs, begin: Array, loss: Array, we
         loss=loss,
         weights=weights,
     )
+
+
+def window_spec(problem: Problem, loss: Loss | None) -> KernelSpec:
+    """The module of a problem's window."""
+    return problem.spec(*window_fragments(problem, loss, "window"), lanes=lanes_for(problem.model.n))

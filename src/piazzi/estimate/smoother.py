@@ -15,6 +15,7 @@ from piazzi.estimate.estimator import Estimate, Stopwatch, View
 from piazzi.estimate.gradients import told_of
 from piazzi.estimate.soundness import check_start
 from piazzi.estimate.width import NOT_BORDERED, TOO_WIDE, too_wide, undetermined
+from piazzi.kernels import KernelSpec
 from piazzi.kernels.bundle import Chain, Innovations, Smoothed
 from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Problem, Tracking
@@ -52,7 +53,7 @@ class Smoother:
             Where the tracking does not fit the problem.
         """
         inputs = prepare(problem, tracking)
-        library = kernels.load(problem.spec(*chain_fragments(problem, "smoother"), lanes=lanes_for(problem.model.n)))
+        library = kernels.load(smoother_spec(problem))
         K, n, (J, m) = inputs.epochs, problem.model.n, inputs.z.shape
         cross = np.empty((max(K - 1, 1), n, n))
         smoothed = Smoothed(
@@ -92,3 +93,8 @@ class Smoother:
             details["cross_covariances"] = cross
         failure = undetermined(problem, covariance[0], mean, covariance[-1])
         return Estimate(problem, tracking, mean, covariance, nu, S, K, watch.seconds(), "delayed", None, details, failure)
+
+
+def smoother_spec(problem: Problem) -> KernelSpec:
+    """The module of a problem's smoother."""
+    return problem.spec(*chain_fragments(problem, "smoother"), lanes=lanes_for(problem.model.n))

@@ -64,13 +64,14 @@ class UnscentedKalmanFilter:
         ValueError
             Where the tracking does not fit the problem, or the weights do not fit its number of states.
         """
-        return root_estimate(self._root(problem), problem, tracking)
+        return root_estimate(self.root(problem), problem, tracking)
 
     def start(self, problem: Problem) -> LiveRootFilter:
         """A filter that takes one measurement at a time, beginning at the prior; raises ValueError as `estimate` does."""
-        return LiveRootFilter(problem, self._root(problem))
+        return LiveRootFilter(problem, self.root(problem))
 
-    def _root(self, problem: Problem) -> Root:
+    def root(self, problem: Problem) -> Root:
+        """How it carries a root; raises ValueError where the weights do not fit the problem's number of states."""
         n = problem.model.n
         if not n + self.kappa > 0:
             raise ValueError(f"kappa is {self.kappa:g}; with {n} values it must be more than {-n}")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.estimate.ahead import compile_for
 from piazzi.estimate.estimator import Estimate, Estimator, views_of
 from piazzi.estimate.registry import by_name
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
@@ -128,6 +129,7 @@ def compare(
     """
     chosen = by_name(estimators)
     prepare(problem, tracking)
+    compile_for(problem, chosen.values())
     bounds = bounds_of(problem, tracking) if thorough else None
     rows: list[Row] = []
     estimates: dict[str, Estimate] = {}

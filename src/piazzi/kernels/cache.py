@@ -1,10 +1,8 @@
-"""Compiled kernels between runs: one sub-folder of the private folder per specification, each with a checksum manifest."""
+"""Compiled kernels: from memory, from disk, or made now."""
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import json
 import logging
 import os
 import threading
@@ -13,17 +11,16 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 from piazzi.kernels.apart import entry_name, symbol
 from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, live_entries, look_for_garbage, note_source, plain_entries
 from piazzi.kernels.folder import Folder, private_folder, writable_folder
 from piazzi.kernels.library import load_objects, say_where
-from piazzi.kernels.settings import may_be_kept
 from piazzi.kernels.spec import KernelSpec, fragment_file, tried
+from piazzi.kernels.store import Kept, keep_where_possible, kept_in
 
 LOGGER = logging.getLogger("piazzi.kernels")
-MANIFEST = "manifest.json"
 _spent: list[float] = []
 _loaded: dict[tuple[KernelSpec, bool], SimpleNamespace] = {}
 _making = threading.RLock()  # what is made may ask for another kernel
@@ -108,38 +105,13 @@ def _from_disk_or_built(spec: KernelSpec) -> SimpleNamespace:
     return SimpleNamespace(**entries)
 
 
-class _Kept(NamedTuple):
-    """What a finished folder holds: object files, their symbols with what they take, and the units that they call."""
-
-    objects: dict[str, bytes]
-    symbols: dict[str, tuple[str, tuple[str, ...]]]
-    calls: list[str]
-
-
 def _read(place: Folder, digest: str, spec: KernelSpec) -> dict[str, Any] | None:
     """Entries of a finished folder, or None where something is missing, truncated, altered or not ours."""
-    kept = _kept(place, digest)
+    kept = kept_in(place, digest)
     return None if kept is None else _bound(spec, kept)
 
 
-def _kept(place: Folder, digest: str) -> _Kept | None:
-    try:
-        with place.inside(digest) as home:
-            manifest = json.loads(home.read(MANIFEST))
-            objects = {}
-            for name, checksum in manifest["objects"].items():
-                objects[name] = home.read(f"{name}.o")
-                if hashlib.sha256(objects[name]).hexdigest() != checksum:
-                    return None
-        symbols = {name: (symbol, tuple(kinds)) for name, (symbol, kinds) in manifest["symbols"].items()}
-        if manifest["seal"] != _seal(manifest, digest):
-            return None
-        return _Kept(objects, symbols, manifest["calls"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return None
-
-
-def _bound(spec: KernelSpec, kept: _Kept) -> dict[str, Any]:
+def _bound(spec: KernelSpec, kept: Kept) -> dict[str, Any]:
     """Entries of object code, whose calls of other modules go to those of this specification's model."""
     _bind(spec, kept.calls)
     return dict(load_objects(kept.objects, kept.symbols, spec.sizes))
@@ -152,31 +124,41 @@ def _bind(spec: KernelSpec, calls: Iterable[str]) -> None:
         say_where(symbol(unit), getattr(module, entry_name(unit)).address)
 
 
-def _seal(manifest: dict[str, Any], digest: str) -> str:
-    """Checksum of the manifest itself, and of whose it is: its symbols and kinds decide how the code is called."""
-    body = json.dumps([digest, manifest["objects"], manifest["symbols"], manifest["calls"]], sort_keys=True)
-    return hashlib.sha256(body.encode()).hexdigest()
-
-
 def _build(spec: KernelSpec, place: Folder | None, digest: str) -> dict[str, Any]:
     """Compile, and keep what came of it where that can be done."""
     source, calls = spec.parts("compiled")
     try:
-        kept = _Kept(*compile_entries(source), calls)
+        kept = Kept(*compile_entries(source), calls)
     except UNKNOWN_INSIDE as error:
         _bind(spec, calls)
         return _built_publicly(source, spec.sizes, error)
-    _keep_where_possible(place, digest, source, kept)
+    keep_where_possible(place, digest, source, kept)
     return _bound(spec, kept)
 
 
-def _keep_where_possible(place: Folder | None, digest: str, source: str, kept: _Kept) -> None:
-    if place is None or not may_be_kept():
-        return
-    try:
-        _keep(place, digest, source, kept)
-    except OSError as error:  # a full disk: the code is here, and is made again next time
-        LOGGER.info("kernels are not kept in %s: %s", place.path, error.strerror or error)
+def make(spec: KernelSpec) -> None:
+    """Compile a module and keep it on disk, for other processes."""
+    source, calls = spec.parts("compiled")
+    keep_where_possible(writable_folder(), spec.digest(), source, Kept(*compile_entries(source), calls))
+
+
+def missing(specs: Iterable[KernelSpec]) -> list[KernelSpec]:
+    """Of the modules, and of those that they call, the ones that are neither in memory nor on disk."""
+    place, _ = private_folder()
+    out, seen = list[KernelSpec](), set[str]()
+    waiting = [spec for spec in specs if (spec, True) not in _loaded]
+    while waiting:
+        spec = waiting.pop(0)
+        digest = spec.digest()
+        if digest in seen or not tried.keys().isdisjoint(spec.fragments):
+            continue
+        seen.add(digest)
+        kept = kept_in(place, digest) if place else None
+        if kept is None:
+            out.append(spec)
+        calls = kept.calls if kept is not None else spec.parts("compiled")[1]
+        waiting += [spec.module_of(unit) for unit in calls] if spec.apart is not None else []
+    return out
 
 
 def _built_publicly(source: str, sizes: Mapping[str, int], error: Exception) -> dict[str, Any]:
@@ -199,52 +181,3 @@ def _warn_of_numba(why: str) -> None:
         f"Piazzi does not know Numba {numba} from inside ({why}): every run compiles its kernels anew, and for longer.",
         stacklevel=2,
     )
-
-
-def _keep(place: Folder, digest: str, source: str, kept: _Kept) -> None:
-    """Write into a folder of our own and move that into place: two processes may do so at once."""
-    with contextlib.suppress(OSError):
-        _sweep(place)
-    with place.new(".building-") as (work, home):
-        try:
-            home.write("kernels.py", source.encode())
-            for name, code in kept.objects.items():
-                home.write(f"{name}.o", code)
-            manifest: dict[str, Any] = {
-                "objects": {n: hashlib.sha256(c).hexdigest() for n, c in kept.objects.items()},
-                "symbols": kept.symbols,
-                "calls": kept.calls,
-            }
-            seal = _seal(json.loads(json.dumps(manifest)), digest)
-            home.write(MANIFEST, json.dumps(manifest | {"seal": seal}).encode())
-            _move(place, work, digest)
-        finally:
-            place.remove(work)
-
-
-def _sweep(place: Folder) -> None:
-    """Remove what builds that were killed left behind: what no living process has locked, or is an hour old."""
-    for name, written in place.ages().items():
-        if not name.startswith((".building-", ".damaged-")):
-            continue
-        if time.time() - written > 3600:
-            place.remove(name)
-            continue
-        with contextlib.suppress(OSError), place.inside(name) as found:
-            if found.hold(wait=False):
-                place.remove(name)
-
-
-def _move(place: Folder, work: str, digest: str) -> None:
-    """Put a finished folder in its place; one that is damaged makes way, one that another process finished stays."""
-    for _ in range(3):
-        try:
-            place.rename(work, digest)
-            return
-        except OSError:
-            if _kept(place, digest) is not None:
-                return
-            aside = f".damaged-{os.urandom(4).hex()}"
-            with contextlib.suppress(OSError):
-                place.rename(digest, aside)
-            place.remove(aside)

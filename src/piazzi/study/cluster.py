@@ -15,9 +15,10 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
+from piazzi.kernels.ahead import processors
 from piazzi.study.pieces import run_task
 from piazzi.study.plan import Plan
-from piazzi.study.pool import ENVIRONMENT, Outcome, processors
+from piazzi.study.pool import ENVIRONMENT, Outcome
 from piazzi.study.tasks import Piece, Task
 from piazzi.study.versions import difference_of, fingerprint
 

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from piazzi.io.atomic import check_writable
+from piazzi.kernels.ahead import processors
 from piazzi.scenarios import load_scenario
 from piazzi.study.log import ENDING, Log
 from piazzi.study.plan import Plan
-from piazzi.study.pool import Processes, ThisProcess, Workers, processors
+from piazzi.study.pool import Processes, ThisProcess, Workers
 from piazzi.study.resume import checks, difference
 from piazzi.study.runner import Progress, Runner
 from piazzi.study.store import Stored, read_store

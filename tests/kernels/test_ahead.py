@@ -1,0 +1,65 @@
+"""Kernels that will be needed are compiled several at a time, by processes that fill the cache and do nothing else."""
+
+import logging
+
+import pytest
+
+import piazzi as pz
+from piazzi.kernels import KernelSpec, ahead, cache, folder, load
+
+MODEL = pz.Model(["x"], ["-x"], [pz.Sensor("range", "x")])
+FRAGMENTS = (("rates",), ("matrices", "arc_steps", "transition", "propagate"))
+
+
+@pytest.fixture
+def specs(tmp_path, monkeypatch):
+    """Two small modules, compiled nowhere yet; two processors."""
+    monkeypatch.setenv("PIAZZI_CACHE", str(tmp_path))
+    monkeypatch.delenv("PIAZZI_JIT", raising=False)
+    monkeypatch.setattr(ahead, "processors", lambda: 2)
+    for remembered in (folder.private_folder, folder.writable_folder):
+        remembered.cache_clear()
+    yield [KernelSpec(MODEL, pz.RungeKutta4().scheme, fragments) for fragments in FRAGMENTS]
+    for remembered in (folder.private_folder, folder.writable_folder):
+        remembered.cache_clear()
+
+
+def test_what_is_missing_is_compiled_by_others_with_progress(specs, caplog):
+    assert cache.missing(specs) == specs
+    with caplog.at_level(logging.INFO, "piazzi.kernels"):
+        assert ahead.compile_ahead(specs) == 2
+        assert sorted(message.split(":")[0] for message in caplog.messages) == ["compiling 1 of 2", "compiling 2 of 2"]
+        assert cache.missing(specs) == []
+        assert load(specs[0]).evaluate_dynamics is not None
+        assert len(caplog.messages) == 2  # nothing was compiled here
+    assert ahead.compile_ahead(specs) == 0
+
+
+def test_one_module_or_one_processor_begins_no_process(specs, monkeypatch):
+    monkeypatch.setattr(ahead, "_started", None)
+    assert ahead.compile_ahead(specs[:1]) == 0
+    monkeypatch.setattr(ahead, "processors", lambda: 1)
+    assert ahead.compile_ahead(specs) == 0
+
+
+@pytest.mark.parametrize("program", ["raise SystemExit(3)", "import sys; sys.stdin.buffer.read(1)"])
+def test_processes_that_end_early_leave_it_to_whoever_needs_it(specs, monkeypatch, program):
+    monkeypatch.setattr(ahead, "PROGRAM", program)
+    ahead.compile_ahead(specs)
+    assert cache.missing(specs) == specs
+
+
+def test_what_an_estimator_is_said_to_need_is_what_it_loads(specs, monkeypatch, line_problem, tracking):
+    from piazzi import kernels
+    from piazzi.estimate.ahead import specs_of
+
+    loaded = []
+    real = kernels.load
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    monkeypatch.setattr(kernels, "load", lambda spec: loaded.append(spec) or real(spec))
+    for text in ("ekf", "ekf:gate=0.99", "srkf", "ukf", "rts", "window:5", "graph"):
+        loaded.clear()
+        estimator = pz.parse_estimator(text)
+        estimator.estimate(line_problem, tracking)
+        said = specs_of(estimator, line_problem)
+        assert said and {id(spec) for spec in said} <= {id(spec) for spec in loaded}, text
