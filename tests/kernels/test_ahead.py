@@ -2,9 +2,13 @@
 
 import logging
 
+import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi import kernels
+from piazzi.estimate.ahead import specs_of
+from piazzi.estimate.registry import parse
 from piazzi.kernels import KernelSpec, ahead, cache, folder, load
 
 MODEL = pz.Model(["x"], ["-x"], [pz.Sensor("range", "x")])
@@ -24,6 +28,7 @@ def specs(tmp_path, monkeypatch):
         remembered.cache_clear()
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_compiled_by_others_with_progress(specs, caplog):
     assert cache.missing(specs) == specs
     with caplog.at_level(logging.INFO, "piazzi.kernels"):
@@ -49,17 +54,16 @@ def test_processes_that_end_early_leave_it_to_whoever_needs_it(specs, monkeypatc
     assert cache.missing(specs) == specs
 
 
-def test_what_an_estimator_is_said_to_need_is_what_it_loads(specs, monkeypatch, line_problem, tracking):
-    from piazzi import kernels
-    from piazzi.estimate.ahead import specs_of
-
+def test_what_an_estimator_is_said_to_need_is_what_it_loads(specs, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem = pz.Problem(MODEL, pz.Gaussian([1.0], [1.0]), [0.01], pz.Station("here", "range", [0.1]))
+    tracking = pz.simulate(problem, np.arange(5.0), np.random.default_rng(0))
     loaded = []
     real = kernels.load
-    monkeypatch.setenv("PIAZZI_JIT", "0")
     monkeypatch.setattr(kernels, "load", lambda spec: loaded.append(spec) or real(spec))
-    for text in ("ekf", "ekf:gate=0.99", "srkf", "ukf", "rts", "window:5", "graph"):
+    for text in ("ekf", "ekf:gate=0.99", "srekf", "ukf", "smoother", "window:5", "graph"):
         loaded.clear()
-        estimator = pz.parse_estimator(text)
-        estimator.estimate(line_problem, tracking)
-        said = specs_of(estimator, line_problem)
+        estimator = parse(text)
+        estimator.estimate(problem, tracking)
+        said = specs_of(estimator, problem)
         assert said and {id(spec) for spec in said} <= {id(spec) for spec in loaded}, text

@@ -17,7 +17,7 @@ from piazzi.determination.burns import burns_of
 from piazzi.determination.case import Case
 from piazzi.determination.case_file import split
 from piazzi.determination.editing import edited
-from piazzi.determination.fit import estimate, estimators
+from piazzi.determination.fit import begun, estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
 from piazzi.determination.instruments import with_instruments
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
@@ -31,6 +31,7 @@ from piazzi.determination.verdict import verdict
 from piazzi.earth import Epoch
 from piazzi.earth.dates import read_date
 from piazzi.earth.rotation import frame_named
+from piazzi.estimate.ahead import compile_for
 from piazzi.estimate.estimator import Estimate, Estimator
 from piazzi.formats import Observations, concatenate, read_tracking
 from piazzi.problem.checks import Array
@@ -173,6 +174,7 @@ def solved(
     started = time.perf_counter()
     answer = next(iter(chosen))
     announce(answer)
+    compile_for(given.problem, [begun(given, estimator) for estimator in chosen.values()])
     keep, reasons, found[answer], analysis = _answered(given, chosen[answer])
     for name, estimator in list(chosen.items())[1:]:
         announce(name)

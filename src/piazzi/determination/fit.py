@@ -48,12 +48,16 @@ def _in_seconds(text: str) -> str:
 
 def estimate(given: Setup, estimator: Estimator, keep: Array) -> Estimate:
     """The estimate from the rows to keep (J,), begun at the states of the guess where the estimator takes them."""
-    tracking = kept(given.tracking, keep)
+    return begun(given, estimator).estimate(given.problem, kept(given.tracking, keep))
+
+
+def begun(given: Setup, estimator: Estimator) -> Estimator:
+    """The estimator that begins at the states of the guess, where it takes them."""
     if isinstance(estimator, FactorGraph) and estimator.start == "ekf":  # what a text without a start means
-        estimator = replace(estimator, start=given.states)
-    elif isinstance(estimator, BatchLeastSquares) and estimator.start is None:
-        estimator = replace(estimator, start=given.states[0], tolerance=max(estimator.tolerance, TOLERANCE))
-    return estimator.estimate(given.problem, tracking)
+        return replace(estimator, start=given.states)
+    if isinstance(estimator, BatchLeastSquares) and estimator.start is None:
+        return replace(estimator, start=given.states[0], tolerance=max(estimator.tolerance, TOLERANCE))
+    return estimator
 
 
 def kept(tracking: Tracking, keep: Array) -> Tracking:

@@ -40,7 +40,7 @@ def specs_of(estimator: Any, problem: Problem) -> list[KernelSpec]:
         case SlidingWindow():
             return [window_spec(problem, estimator.loss)]
         case FactorGraph():
-            first = [filter_spec(problem)] if estimator.start == "ekf" else []
+            first = [filter_spec(problem)] if isinstance(estimator.start, str) and estimator.start == "ekf" else []
             model = problem.model
             solve = [] if model.constants else [solve_spec(model.n, model.width, problem.noise_varies)]
             return [*first, chain_spec(problem), *solve]
