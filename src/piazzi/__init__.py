@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from piazzi import earth, formats, orbit
+
+    def scenarios() -> dict[str, str]:
+        """Names of the built-in scenarios, with their titles."""
+
     from piazzi.determination.determining import determine
     from piazzi.determination.ephemerides import ephemeris
     from piazzi.determination.initial import InitialOrbits, initial_orbits
@@ -37,6 +41,7 @@ if TYPE_CHECKING:
     from piazzi.evaluate.window_lengths import windows
     from piazzi.evaluate.window_trade import WindowTrade
     from piazzi.formats import Ephemeris, Observations, read_ephemeris, read_tracking
+    from piazzi.io import save
     from piazzi.kernels import (
         ConstantAcceleration,
         Discrete,
@@ -110,6 +115,7 @@ _WHERE = {
         "piazzi.estimate.propagation": "Propagation propagate",
         "piazzi.estimate.substeps": "choose_substeps substep_error",
         "piazzi.loading": "load",
+        "piazzi.io": "save",
         "piazzi.outside.function": "Function",
         "piazzi.outside.interpolation": "Interpolation",
         "piazzi.outside.table": "Table",
@@ -125,7 +131,7 @@ _WHERE = {
         "piazzi.determination.initial": "InitialOrbits initial_orbits",
         "piazzi.determination.result": "Determination",
         "piazzi.determination.unknowns": "Estimated",
-        "": "earth formats orbit",
+        "": "earth formats orbit scenarios",
     }.items()
     for name in names.split()
 }
@@ -141,8 +147,8 @@ __all__ = [
     "Station", "Study", "Table", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade",
     "choose_substeps", "compare", "determine", "difference", "earth", "ephemeris", "formats", "initial_orbits",
     "kepler_transition", "load", "observability", "orbit", "passes", "predict", "propagate", "propagate_kepler",
-    "read_ephemeris", "read_store", "read_tracking", "simulate", "step_warning", "substep_error", "update", "windows",
-    "with_gauss_markov", "with_prior_at", "write_report",
+    "read_ephemeris", "read_store", "read_tracking", "save", "scenarios", "simulate", "step_warning", "substep_error",
+    "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip
 
 

@@ -61,6 +61,12 @@ def suggest(name: str, valid: Iterable[object]) -> str:
     return f"; did you mean {near!r}?" if near else ""
 
 
+def listed(names: Iterable[str], most: int = 6) -> str:
+    """Names with commas, the first few of many."""
+    found = list(names)
+    return ", ".join(found) if len(found) <= most else f"{', '.join(found[:most])} and {len(found) - most} more"
+
+
 def nearest(name: str, valid: Iterable[object]) -> str:
     """'; did you mean ...?' with the nearest valid name, or the list of them."""
     options = [str(v) for v in valid]

@@ -88,7 +88,7 @@ def test_a_considered_parameter_inflates():
 def test_a_dataset_has_names_units_and_the_date():
     problem = two_body(epoch="2016-02-13T16:00:00 UTC")
     found = pz.propagate(problem, TIMES[:2]).to_dataset()
-    assert found["mean"].dims == ("time", "state")
+    assert found["state_mean"].dims == ("time", "state")
     assert found.attrs["epoch"] == "2016-02-13T16:00:00 UTC"
     assert found["covariance"].shape == (2, 6, 6)
 

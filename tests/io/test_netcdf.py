@@ -103,7 +103,7 @@ def test_any_reader_finds_names_and_units(tmp_path):
     problem, tracking = pz.load("template", seed=4)
     save_estimate(tmp_path / "a.nc", pz.ExtendedKalmanFilter().estimate(problem, tracking))
     with xarray.open_dataset(tmp_path / "a.nc", group="estimate") as dataset:
-        assert dataset["mean"].dims == ("time", "state")
+        assert dataset["state_mean"].dims == ("time", "state")
         assert list(dataset["state"].values) == ["x", "v", "k"]
         assert list(dataset["unit"].values) == ["m", "m/s", "1/s^2"]
         assert list(dataset["component_name"].sel(station="north").values) == ["range", "range_rate"]
@@ -118,7 +118,7 @@ def test_to_dataset_has_the_numbers_of_the_estimate():
     problem, tracking = pz.load("b612-range")
     estimate = pz.ExtendedKalmanFilter().estimate(problem, tracking)
     dataset = estimate.to_dataset()
-    assert_array_equal(dataset["mean"].sel(state="vx"), estimate.mean[:, 2])
+    assert_array_equal(dataset["state_mean"].sel(state="vx"), estimate.mean[:, 2])
     assert_array_equal(dataset["covariance"].sel(state="x", state_2="vy"), estimate.covariance[:, 0, 3])
     assert_array_equal(dataset["innovation"], estimate.innovations)
 
@@ -227,8 +227,8 @@ def virtual(root):
         (variable("estimate", np.ones(3)), "'estimate' is not a group"),
         (variable("estimate", None), "no estimate"),
         (
-            lambda root: variable("mean", np.ones((3, 4)))(root["estimate"]),
-            "variable 'mean' has shape (3, 4); it must be (100, 4)",
+            lambda root: variable("state_mean", np.ones((3, 4)))(root["estimate"]),
+            "variable 'state_mean' has shape (3, 4); it must be (100, 4)",
         ),
         (lambda root: said("about", lambda a: a.update(view="sideways"))(root["estimate"]), "about.view: is 'sideways'"),
         (

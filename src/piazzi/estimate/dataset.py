@@ -43,7 +43,7 @@ def estimate_variables(
     """
     names = np.array(problem.model.names, dtype=object)
     variables = _rows(problem, tracking)
-    variables["mean"] = (("time", "state"), arrays["mean"], {"long_name": "estimated state"})
+    variables["state_mean"] = (("time", "state"), arrays["mean"], {"long_name": "estimated state"})
     variables["covariance"] = (("time", "state", "state_2"), arrays["covariance"], {"long_name": "covariance of the estimate"})
     variables["innovation"] = (("row", "component"), arrays["innovations"], {"long_name": "measurement minus prediction"})
     variables["innovation_covariance"] = (("row", "component", "component_2"), arrays["innovation_covariances"])

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
+from piazzi.drawn import Drawn
 from piazzi.estimate.lost_root import lost_root
 from piazzi.estimate.soundness import defect
 from piazzi.kernels import build_seconds
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, Locked
 from piazzi.problem.epochs import epoch_of
+from piazzi.text import listed
 
 if TYPE_CHECKING:
     import xarray
@@ -55,7 +57,7 @@ class Stopwatch:
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Estimate(Locked):
+class Estimate(Locked, Drawn):
     """Result of an estimator.
 
     Attributes
@@ -192,6 +194,13 @@ class Estimate(Locked):
             raise ValueError(f"nothing can be propagated: {self.message}")
         considered = {name: self.details[f"considered_{name}"][-1] for name in self.problem.considered}
         return forecast(self.problem, self.times, last, considered, at)
+
+    def __repr__(self) -> str:
+        """In short: of what, over how many times, and whether it succeeded."""
+        named = f" of {self.problem.name!r}" if self.problem.name else ""
+        said = f": {self.message}" if self.message else ""
+        state = "success" if self.success else "no success"
+        return f"<Estimate{named}, {self.view}, {len(self.times)} times, {listed(self.names, 12)}; {state}{said}>"
 
     def to_dataset(self) -> xarray.Dataset:
         """Times, means, covariances and innovations as a labelled dataset with units."""

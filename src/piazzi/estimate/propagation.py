@@ -68,7 +68,7 @@ class Propagation(Locked):
         if self.problem.epoch is not None:
             about["epoch"] = self.problem.epoch.exact()
         variables = {
-            "mean": (("time", "state"), self.mean, {"long_name": "state"}),
+            "state_mean": (("time", "state"), self.mean, {"long_name": "state"}),
             "covariance": (("time", "state", "state_2"), self.covariance, {"long_name": "covariance of the state"}),
         }
         places = {"time": ("time", self.times, {"units": "s"}), "state": ("state", names), "state_2": ("state_2", names)}

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.drawn import Drawn
 from piazzi.estimate.ahead import compile_for
 from piazzi.estimate.estimator import Estimate, Estimator, views_of
 from piazzi.estimate.registry import by_name
@@ -22,6 +23,7 @@ from piazzi.evaluate.rows import Row, evaluate, numbers
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.epochs import dated
 from piazzi.problem.inputs import prepare
+from piazzi.text import listed
 
 if TYPE_CHECKING:
     import xarray
@@ -32,7 +34,7 @@ SCHEMA = "piazzi.compare/1"
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Drawn):
     """Rows side by side, and the estimates that they are about.
 
     Attributes
@@ -97,6 +99,11 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         return html(self.problem.model, self.rows, self.tracking.values)
+
+    def __repr__(self) -> str:
+        """In short: which estimators, on what."""
+        failed = [name for name, e in self.estimates.items() if not e.success]
+        return f"<Comparison of {listed(self.estimates)} on {self.problem!r}{f'; failed: {listed(failed)}' if failed else ''}>"
 
     def __str__(self) -> str:
         return as_text(self)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.drawn import Drawn
 from piazzi.evaluate.attempts import Attempt
 from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
 from piazzi.evaluate.information import Information
@@ -29,7 +30,7 @@ _LISTED = 8  # twins in the table
 
 
 @dataclass(frozen=True, eq=False)
-class Observability:
+class Observability(Drawn):
     """What the measurements of a tracking say about the first state, without the prior.
 
     Attributes
@@ -180,6 +181,10 @@ class Observability:
 
     def _repr_html_(self) -> str:
         return as_html(self.grids(), self.sentences())
+
+    def __repr__(self) -> str:
+        """In short: the verdict's first sentence, on what."""
+        return f"<{_split(self.verdict)[0].removesuffix('.')}; {self.problem!r}>"
 
     def __str__(self) -> str:
         return as_text(self)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.drawn import Drawn
 from piazzi.evaluate.comparison_table import PASSED, row_display
 from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
 from piazzi.evaluate.judgement import failing, tested
@@ -16,6 +17,7 @@ from piazzi.evaluate.rows import Row, numbers
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.epochs import dated
+from piazzi.text import listed
 
 if TYPE_CHECKING:
     import xarray
@@ -48,7 +50,7 @@ class Timing:
 
 
 @dataclass(frozen=True, eq=False)
-class WindowTrade:
+class WindowTrade(Drawn):
     """Sliding windows of several lengths on the same measurements, beside the full graph.
 
     Attributes
@@ -197,6 +199,10 @@ class WindowTrade:
 
     def _repr_html_(self) -> str:
         return as_html(self.grids(), self.sentences())
+
+    def __repr__(self) -> str:
+        """In short: which lengths, on what."""
+        return f"<WindowTrade: lags {listed(str(int(lag)) for lag in self.lags)} on {self.problem!r}>"
 
     def __str__(self) -> str:
         return as_text(self)

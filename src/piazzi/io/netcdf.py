@@ -157,7 +157,7 @@ def _estimate(group: Any, problem: Problem, tracking: Tracking, delayed: Estimat
     details |= {key.removeprefix(DETAIL): _detail(group, key) for key in group if key.startswith(DETAIL)}
     return Estimate(
         problem, tracking,
-        _shaped(group, "mean", (K, n)), _shaped(group, "covariance", (K, n, n)),
+        _shaped(group, "state_mean" if "state_mean" in group else "mean", (K, n)), _shaped(group, "covariance", (K, n, n)),
         _shaped(group, "innovation", (J, m)), _shaped(group, "innovation_covariance", (J, m, m)),
         int(iterations), seconds, cast(View, view), delayed, details, failure or "",
     )  # fmt: skip

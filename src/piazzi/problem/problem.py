@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib import import_module
 from math import inf, isfinite
 from typing import Any
 
 import numpy as np
 
+from piazzi.drawn import later
 from piazzi.kernels import Integrator, Kepler, KernelSpec, RungeKutta8
 from piazzi.kernels.bundle import Belief, Given
 from piazzi.kernels.spec import outside_fragments
@@ -21,7 +21,7 @@ from piazzi.problem.checks import Array, check_span, finite_vector, lock, numeri
 from piazzi.problem.constants import with_station_constants
 from piazzi.problem.epochs import check_near, epoch_given
 from piazzi.problem.parts import Gaussian, Manoeuvre, Station, Truth
-from piazzi.text import nearest
+from piazzi.text import listed, nearest
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +151,16 @@ class Problem:
         OSError
             Where nothing can be written there.
         """
-        files = import_module("piazzi.io.scenario_text")  # downstream of problems, which know nothing of files otherwise
-        text: str = files.scenario_text(self, times) if path is None else files.write_scenario(path, self, times)
-        return text
+        if path is None:
+            return str(later("io.scenario_text", "scenario_text")(self, times))
+        return str(later("io.scenario_text", "write_scenario")(path, self, times))
+
+    def __repr__(self) -> str:
+        """In short: what is estimated, by whom it is seen, and when time zero is."""
+        named = f"{self.name!r}: " if self.name else ""
+        seen = f", seen by {listed(s.name for s in self.stations)}" if self.stations else ""
+        since = "" if self.epoch is None else f", t from {self.epoch}"
+        return f"<Problem {named}{listed(self.model.names, 12)}{seen}{since}>"
 
     @cached_property
     def mean(self) -> Array:

@@ -8,15 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.drawn import Drawn, later
 from piazzi.problem.checks import Array, backwards, check_span, frozen, lock, numeric
 from piazzi.problem.epochs import check_near, check_same, epoch_given, shifted
+from piazzi.text import listed
 
 if TYPE_CHECKING:
+    import os
+
+    import xarray
+
     from piazzi.problem.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
-class Tracking:
+class Tracking(Drawn):
     """Rows of measurements in order of time; rows of one time form an epoch.
 
     Parameters
@@ -63,6 +69,14 @@ class Tracking:
         _ = self.times  # made now, with the rows of each epoch, so that no estimator has to
         if self.truth is not None:
             put(self, "truth", self._checked_truth())
+
+    def __repr__(self) -> str:
+        """In short: how many rows, when, by whom."""
+        names = [] if self.row_stations is None else list(dict.fromkeys(self.row_stations.tolist()))
+        by = f" by {listed(names)}" if names else ""
+        since = "" if self.epoch is None else f" past {self.epoch}"
+        span = f"{self.row_times[0]:g} to {self.row_times[-1]:g} s{since}"
+        return f"<Tracking: {len(self.row_times)} rows{by}, {span}{', with truth' if self.truth is not None else ''}>"
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Nothing can be written into a copy either, so that what `prepare` keeps of it stays right."""
@@ -198,6 +212,15 @@ class Tracking:
         values = np.concatenate([self.padded(width), zeros])[order]
         stations = np.concatenate([names, np.full(len(at), station)])[order]
         return Tracking(row_times[order], values, stations, self.truth, self.epoch)
+
+    def to_dataset(self, problem: Problem) -> xarray.Dataset:
+        """Measurements, and the truth where it is known, with the problem's names and units."""
+        found: xarray.Dataset = later("estimate.dataset", "tracking_to_dataset")(problem, self)
+        return found
+
+    def to_csv(self, path: str | os.PathLike[str], problem: Problem) -> None:
+        """Write a table that `load` reads back with its scenario, bit for bit; raises OSError where it cannot be written."""
+        later("io.csv", "write_csv")(path, problem, self)
 
     def _check_widths(self, problem: Problem, index: Array) -> None:
         columns = self.values.shape[1]

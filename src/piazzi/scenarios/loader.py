@@ -54,6 +54,11 @@ def names() -> list[str]:
     return sorted(file.stem for file in FILES.glob("*.toml") if file.stem != TEMPLATE)
 
 
+def titles() -> dict[str, str]:
+    """Titles of the built-in scenarios by name."""
+    return {name: str(tomllib.loads(show(name))["title"]) for name in names()}
+
+
 def show(name: str = TEMPLATE) -> str:
     """The commented text of a built-in scenario, or of "template", to start from; raises ValueError for an unknown name."""
     known = [*names(), TEMPLATE]

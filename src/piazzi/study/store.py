@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.drawn import Drawn
 from piazzi.io import hdf5
 from piazzi.problem.checks import Array
 from piazzi.study.plan import SCHEMA
@@ -26,7 +27,7 @@ MOST_SHOWN = 20  # messages of failed runs
 
 
 @dataclass(frozen=True, eq=False)
-class Stored:
+class Stored(Drawn):
     """A finished study: what it was, and its results row by row.
 
     Attributes
@@ -39,6 +40,11 @@ class Stored:
     path: Path
     about: Mapping[str, Any]
     times: Array
+
+    def __repr__(self) -> str:
+        """In short: of what, how many runs and points."""
+        about, points = self.about["specification"], len(self.points)
+        return f"<Study of {about['name'] or 'a study'}: {about['runs']} runs at {points} point{'s' * (points != 1)}>"
 
     @property
     def epoch(self) -> Epoch | None:
@@ -85,10 +91,14 @@ class Stored:
 
 
 @dataclass(frozen=True, eq=False)
-class Summary:
+class Summary(Drawn):
     """A study's results in short."""
 
     stored: Stored
+
+    def __repr__(self) -> str:
+        """In short."""
+        return f"<Summary of {self.stored!r}>"
 
     @cached_property
     def lines(self) -> tuple[Line, ...]:

@@ -14,6 +14,7 @@ from piazzi.study import Line, Summary
 from piazzi.text import printable
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 MOST_POINTS = 12  # that get pictures of their own
@@ -48,28 +49,33 @@ def error_page(summary: Summary, lines: list[Line]) -> Figure:
     """For each group of states the root mean square error over runs, and the Cramer-Rao bound; a few lines have bands."""
     stored = summary.stored
     figure = _figure(8.0, 2.6 * len(stored.groups) + 0.6)
-    names = tuple(line.estimator for line in lines)
     for i, group in enumerate(stored.groups):
-        ax, show = figure.add_subplot(len(stored.groups), 1, i + 1), group_display(stored, group)
-        unit = time_axis(ax, stored.times, stored.epoch)
-        for line in lines:
-            style = line_of(line.estimator, line.view, names)
-            rms, (low, _, high) = line.history.rms[:, i], line.history.quantiles[:, :, i] * show.factor
-            ax.plot(stored.times * unit.factor, rms * show.factor, label=label_of(line.estimator, line.view), **style)
-            if len(lines) <= FEW:
-                ax.fill_between(stored.times * unit.factor, low, high, color=style["color"], alpha=0.12, linewidth=0)
-        for view, dash in (("realtime", ":"), ("delayed", "-.")):
-            bound = next((line.history.bound[:, i] for line in lines if line.view == view), None)
-            if bound is not None:
-                label = f"bound, {'real time' if view == 'realtime' else 'delayed'}"
-                ax.plot(stored.times * unit.factor, bound * show.factor, color="black", linestyle=dash, label=label)
-        ax.set_yscale("log")
-        plain_ticks(ax)
-        ax.set_ylabel(plain(show.label(f"{printable(group)} error")))
+        ax = study_errors(figure.add_subplot(len(stored.groups), 1, i + 1), summary, lines, group)
         if i == 0:
             ax.legend(ncols=3, fontsize=7)
     _title(figure, summary, lines, f"root mean square{'; shaded, 5 to 95 % of runs' if len(lines) <= FEW else ''}")
     return figure
+
+
+def study_errors(ax: Axes, summary: Summary, lines: list[Line], group: str) -> Axes:
+    """Root mean square error of a group of states over runs, and the Cramer-Rao bound; a few lines have bands."""
+    stored, i, show = summary.stored, summary.stored.groups.index(group), group_display(summary.stored, group)
+    unit, names = time_axis(ax, stored.times, stored.epoch), tuple(line.estimator for line in lines)
+    for line in lines:
+        style = line_of(line.estimator, line.view, names)
+        rms, (low, _, high) = line.history.rms[:, i], line.history.quantiles[:, :, i] * show.factor
+        ax.plot(stored.times * unit.factor, rms * show.factor, label=label_of(line.estimator, line.view), **style)
+        if len(lines) <= FEW:
+            ax.fill_between(stored.times * unit.factor, low, high, color=style["color"], alpha=0.12, linewidth=0)
+    for view, dash in (("realtime", ":"), ("delayed", "-.")):
+        bound = next((line.history.bound[:, i] for line in lines if line.view == view), None)
+        if bound is not None:
+            label = f"bound, {'real time' if view == 'realtime' else 'delayed'}"
+            ax.plot(stored.times * unit.factor, bound * show.factor, color="black", linestyle=dash, label=label)
+    ax.set_yscale("log")
+    plain_ticks(ax)
+    ax.set_ylabel(plain(show.label(f"{printable(group)} error")))
+    return ax
 
 
 def nees_page(summary: Summary, lines: list[Line]) -> Figure:
