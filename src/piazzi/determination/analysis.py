@@ -23,7 +23,7 @@ class Analysis:
     computed : (J, m), what the solution makes of the measurements, an angle within half a turn of what was observed
     whitened : (J, m), the same in units of the noise, components of a row made independent
     rows : (J, m, n), minus the derivatives of `whitened` by the first state and the constants
-    prior : (p, n), rows that the priors of the constants are worth
+    prior : (p, n), rows that the priors of the constants are worth, or an orbit that was known before
     prior_miss : (p,), how far the solution is from those priors, in their sigmas
     """
 
@@ -69,10 +69,15 @@ def analysed(given: Setup, states: Array) -> Analysis:
     # along an angle on the sky, as kernels have it; of components with a full covariance whitened ones are mixed
     apart = wrapped(problem, stations, inputs.z - computed)
     residual = np.where(full, apart, shot.innovations * sigma)
+    rows = shot.rows.reshape(J, m, -1)
+    if given.before is not None:
+        mean, root = given.before
+        own = np.linalg.solve(root, np.eye(len(mean)))
+        return Analysis(residual, inputs.z - apart, shot.innovations, rows, own, own @ (mean - states[0]))
     constants = 6  # and processes, of which as much is known
     spread = np.sqrt(np.diag(problem.covariance))[constants:]
     known = np.flatnonzero(spread > 0)
     prior = np.zeros((len(known), problem.model.n))
     prior[np.arange(len(known)), constants + known] = 1.0 / spread[known]
     miss = (states[0, constants:] - problem.mean[constants:])[known] / spread[known]
-    return Analysis(residual, inputs.z - apart, shot.innovations, shot.rows.reshape(J, m, -1), prior, -miss)
+    return Analysis(residual, inputs.z - apart, shot.innovations, rows, prior, -miss)

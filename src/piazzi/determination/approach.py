@@ -42,7 +42,12 @@ class Place:
 
 
 def approached(given: Setup) -> Setup:
-    """The set-up with states, and a prior mean, that are near the answer; itself where nothing nearer was found."""
+    """The set-up with states, and a prior mean, that are near the answer; itself where nothing nearer was found.
+
+    An orbit that was known before stays: it is the prior.
+    """
+    if given.before is not None:
+        return given
     times = given.tracking.times
     begun = float(np.clip(given.guess.epoch - given.measured.epoch, times[0], times[-1]))
     first = _state_at(given, begun)

@@ -71,6 +71,10 @@ class Case:
     guess: Any = said(
         None, "ORBIT", "Where to begin: elements, a state, or a file; default none: all orbits that fit.", usual=True, file=True
     )
+    prior: Any = said(
+        None, "FILE", "An orbit of before, with its covariance; what it has used of the measurements is left out.", file=True
+    )
+    from_: Any = said(None, "DATE", "From when on measurements are new to --prior, where it does not say.", read.instant)
     stations: Any = said(None, "FILE", "Stations: SINEX, TOML, ilrs; may be repeated.", many=True, usual=True, file=True)
     with_: Any = said(
         None, "ESTIMATOR", "May be repeated, the first is the answer.  [default: graph]", read.estimators, many=True, usual=True

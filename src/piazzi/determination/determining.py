@@ -16,6 +16,7 @@ from piazzi.determination.approach import approached
 from piazzi.determination.burns import burns_of
 from piazzi.determination.case import Case
 from piazzi.determination.case_file import split
+from piazzi.determination.earlier import Earlier, earlier_of, fresh
 from piazzi.determination.editing import edited
 from piazzi.determination.fit import begun, estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
@@ -44,6 +45,8 @@ ROUNDS = 4  # of the answer, while rows are left out or taken back
 def determine(
     *tracking: Any,
     guess: Any = None,
+    prior: Any = None,
+    from_: Any = None,
     stations: Any = None,
     with_: Any = None,
     forces: Any = None,
@@ -69,6 +72,9 @@ def determine(
     guess : where to begin: text, ``"a=7078km e=0.001 i=98.2deg raan=10deg argp=0deg nu=0deg epoch=2026-11-03T04:12:00Z"``
         or ``"x=7000km ... vz=7.5km/s epoch=..."``; a file (OEM, OPM, TLE, OMM, SP3, CPF, an earlier determination's JSON); a
         `Guess`.  None, or "none": all orbits that fit are looked for.
+    prior : an orbit of before whose covariance is taken too: a determination, its JSON or .nc, an OEM or OPM with covariances,
+        two-line elements; measurements that it has used already are left out
+    from_ : date from which on measurements are new to that prior, where it does not say it
     stations : files, `earth.Station` objects or a `StationList`; "ilrs" are those of the package
     with_ : estimators, as the command line writes them; the first is the answer.  Default the graph.
     forces : "default" (by height, as without it), "none", text such as ``"gravity=EGM2008 degree=40 drag=exponential"``, or
@@ -122,7 +128,8 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
     _, at = _instant(case.epoch)
     wanted, burns = asked(case.estimate, case.consider), burns_of(case.manoeuvre)
     rows = of_object(_observations(files, case.answers), case.object)
-    seen, begin = _seen(rows, case, any(one.what.kind == CLOCK for one in wanted))
+    rows, earlier = _beside_prior(rows, case)
+    seen, begin = _seen(rows, case, earlier, any(one.what.kind == CLOCK for one in wanted))
     seen = with_instruments(seen, [one for one in wanted if one.what.kind in INSTRUMENTS])
 
     def chosen(orbit: Guess) -> Chosen:
@@ -133,10 +140,25 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
         return with_unknowns(found, wanted, burns, seen)
 
     begin = begin or unguided(seen, lambda first: posed(seen, chosen(first), first))
-    return setup(seen, chosen(begin), begin, at=at)
+    return setup(seen, chosen(begin), begin, at=at, earlier=earlier)
 
 
-def _seen(rows: Observations, case: Case, clocks: bool) -> tuple[Measured, Guess | None]:
+def _beside_prior(rows: Observations, case: Case) -> tuple[Observations, Earlier | None]:
+    """The measurements that are new to the orbit of before, and that orbit; all of them where there is none."""
+    since = None if case.from_ is None else Epoch(case.from_)
+    if case.prior is None:
+        if since is not None:
+            raise ValueError("--from says from when on measurements are new to --prior, which is not given")
+        return rows, None
+    there = rows.t[rows.measured]
+    if not len(there):
+        raise ValueError("there is no measurement to use")
+    first = rows.epoch + float(there.min())
+    earlier = earlier_of(case.prior, first if since is None else max(first, since), case.object)
+    return fresh(rows, earlier, since), earlier
+
+
+def _seen(rows: Observations, case: Case, earlier: Earlier | None, clocks: bool) -> tuple[Measured, Guess | None]:
     """What was measured, by the centre that the user, the guess or the measurements say; and the guess where there is one."""
 
     def by(about: str) -> Measured:
@@ -146,7 +168,7 @@ def _seen(rows: Observations, case: Case, clocks: bool) -> tuple[Measured, Guess
         )
 
     seen = by(case.about or "earth")
-    begin = _guess(case.guess, seen, case.object)
+    begin = earlier.guess if earlier and case.guess is None else _guess(case.guess, seen, case.object)
     about = begin.about if begin is not None else seen.about
     if case.about is None and begin is None and goes_about_the_sun(seen):
         about = "sun"

@@ -51,6 +51,7 @@ def document(found: Any) -> dict[str, Any]:
         "left_out": {**found.setup.chosen.left_out, **found.setup.measured.left_out},
         "assumed": list(found.setup.assumed),
         "data": data(found),
+        **({} if found.setup.earlier is None else {"prior": prior(found)}),
         **{key: value for key, value in found.notes.items() if key in ("estimators", "against", "command")},
     }
 
@@ -138,6 +139,13 @@ def span(found: Any) -> dict[str, Any]:
     epoch = found.setup.measured.epoch
     first, last = (epoch + float(t) for t in (times[0], times[-1]))
     return {"first": first.to(found.scale), "last": last.to(found.scale), "seconds": float(times[-1] - times[0])}
+
+
+def prior(found: Any) -> dict[str, Any]:
+    """The orbit that was known before, and what it was made of."""
+    earlier = found.setup.earlier
+    first, last = (when.to(found.scale) for when in earlier.used) if earlier.used else (None, None)
+    return {"file": earlier.source, "epoch": earlier.epoch.to(found.scale), "first": first, "last": last}
 
 
 def data(found: Any) -> list[dict[str, Any]]:

@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination.earlier import Earlier, root_of
 from piazzi.determination.guesses import Guess
 from piazzi.determination.motion import Extra, process_noise, with_processes
 from piazzi.determination.orbit_forces import Chosen
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import Label
 from piazzi.earth import EphemerisWarning, Epoch
+from piazzi.estimate.propagation import propagate
 from piazzi.kernels import RungeKutta8
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.arcs import Steps, arc
@@ -34,6 +36,8 @@ class Setup:
     problem, tracking : times are past `measured.epoch`
     rows : (J, m), indices of the observations, -1 where there is none
     states : (K, n), of the guess at all epochs, to begin from
+    earlier : what was known before, None for no more than a guess
+    before : (n,) and (n, n), that at the first epoch with a lower triangular root of its covariance
     solution : index of the epoch at which the answer stands
     """
 
@@ -46,6 +50,8 @@ class Setup:
     states: Array
     solution: int
     assumed: tuple[str, ...]
+    earlier: Earlier | None = None
+    before: tuple[Array, Array] | None = None
 
     @property
     def labels(self) -> Mapping[str, Label]:
@@ -61,6 +67,7 @@ def setup(
     roles: Mapping[str, str] | None = None,
     values: Mapping[str, Any] | None = None,
     at: Epoch | None = None,
+    earlier: Earlier | None = None,
 ) -> Setup:
     """The problem that these make.
 
@@ -69,6 +76,7 @@ def setup(
     measured, chosen, guess : what was measured, forces, where to begin
     roles, values : of parameters, beside those of the forces or instead of them
     at : when the answer is to stand; default the last row
+    earlier : an orbit with its covariance, which is the prior, carried to the first row with process noise
 
     Raises
     ------
@@ -80,12 +88,31 @@ def setup(
     times = tracking.times
     begun = guess.epoch - measured.epoch
     states = _followed(problem, begun, times, chosen.max_step)
-    mean = states[0, : len(problem.model.states)]
-    begin = float(times[0])
+    begin = float(times[0]) if earlier is None else earlier.epoch - measured.epoch
     later = [m for m in problem.manoeuvres if m.time > begin + SAME * max(abs(begin), 1.0)]
-    problem = replace(problem, prior=_prior(mean, chosen.extra), prior_time=begin, manoeuvres=later)
-    assumed = tuple(dict.fromkeys([*guess.assumed, *measured.assumed, *chosen.assumed]))
-    return Setup(measured, chosen, guess, problem, tracking, rows, states, solution, assumed)
+    problem = replace(problem, manoeuvres=later)
+    assumed, before = [*guess.assumed, *measured.assumed, *chosen.assumed], None
+    if earlier is None:
+        mean = states[0, : len(problem.model.states)]
+        problem = replace(problem, prior=_prior(mean, chosen.extra), prior_time=begin)
+    else:
+        assumed += earlier.assumed
+        problem = _known(problem, earlier, begin)
+        found = propagate(problem, times[:1])
+        before = (found.mean[0], root_of(found.covariance[0]))
+    said = tuple(dict.fromkeys(assumed))
+    return Setup(measured, chosen, guess, problem, tracking, rows, states, solution, said, earlier, before)
+
+
+def _known(problem: Problem, earlier: Earlier, t: float) -> Problem:
+    """The problem with an earlier orbit for its prior, and what that knew of the same processes and constants."""
+    mean, P = problem.prior.mean.copy(), problem.prior.covariance.copy()
+    mean[:6], P[:6, :6] = earlier.state, earlier.covariance
+    for i, name in enumerate(problem.model.states[6:], start=6):
+        if name in earlier.constants:
+            mean[i], P[i, i] = earlier.constants[name]
+    constants = {name: Gaussian(*earlier.constants[name]) for name in problem.model.constants if name in earlier.constants}
+    return replace(problem, prior=Gaussian(mean, P), prior_time=t, parameters={**problem.parameters, **constants})
 
 
 def with_prior(given: Setup, states: Array, covariance: Array) -> Setup:

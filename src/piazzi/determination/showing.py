@@ -156,7 +156,8 @@ def shown(given: Setup) -> str:
     lines += [
         f"Begins at {given.guess.epoch} from {given.guess.source}: {', '.join(f'{v:.6g}' for v in given.guess.state)} (m, m/s)."
     ]
-    lines += ["Unknowns:", "  position and velocity, which the guess leaves open"]
+    known = "which the guess leaves open" if given.earlier is None else f"known from {given.earlier.source}"
+    lines += ["Unknowns:", f"  position and velocity, {known}"]
     for name in problem.model.constants:
         lines.append(f"  {_unknown(given, name)}")
     for one in chosen.extra.processes:

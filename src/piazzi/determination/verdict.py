@@ -82,17 +82,18 @@ def seen(given: Setup, analysis: Analysis | None, keep: Array) -> Sentence:
     smallest, weakest = float(values[-1]), directions[-1] * scale
     many = int(np.isfinite(analysis.whitened[keep]).sum())
     words = _direction(given.states[0], weakest)
+    means = f"{many} measurements" + (f" and {given.earlier.source}" if given.earlier else " alone")
     if not smallest > 1.0:
         blind = int((values <= 1.0).sum())
         return Sentence(
             False, smallest, test,
-            f"Not seen: {many} measurements leave {blind} of {len(values)} directions as open as the guess, "
+            f"Not seen: {means.removesuffix(' alone')} leave {blind} of {len(values)} directions as open as the guess, "
             f"the widest {words}.",
         )  # fmt: skip
     words, size = _widest(given.states[0], root, scale)
     return Sentence(
         True, smallest, test,
-        f"Seen: {many} measurements alone determine the orbit, at its start to {_metres(size)} in the widest axis, {words}.",
+        f"Seen: {means} determine the orbit, at its start to {_metres(size)} in the widest axis, {words}.",
     )  # fmt: skip
 
 

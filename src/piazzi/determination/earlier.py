@@ -1,0 +1,182 @@
+"""Yesterday's orbit: what was known before tonight's measurements, and which of them it has used already."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from piazzi.determination.guesses import SCHEMA, Guess
+from piazzi.determination.orbit import definite_root
+from piazzi.determination.words import date
+from piazzi.earth import Epoch
+from piazzi.earth.rotation import frame_named
+from piazzi.formats import Observations
+from piazzi.io import hdf5
+from piazzi.opening import opened
+from piazzi.orbit.starting import in_axes, start_of
+from piazzi.problem.checks import Array
+
+STATES = ("x", "y", "z", "vx", "vy", "vz")
+LARGEST = 2**26  # bytes of a determination
+
+
+@dataclass(frozen=True, eq=False)
+class Earlier:
+    """An orbit with its covariance.
+
+    Attributes
+    ----------
+    epoch : of the state
+    state, covariance : (6,) and (6, 6), of the GCRF
+    constants : values and variances by name
+    used : first and last measurement that it was made of, None where nobody says it
+    source : its file
+    assumed : what was assumed of it
+    about : what it goes about
+    """
+
+    epoch: Epoch
+    state: Array
+    covariance: Array
+    source: str
+    constants: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    used: tuple[Epoch, Epoch] | None = None
+    assumed: tuple[str, ...] = ()
+    about: str = "earth"
+
+    @property
+    def guess(self) -> Guess:
+        """Where to begin."""
+        return Guess(self.epoch, self.state[:3], self.state[3:], self.source, about=self.about)
+
+
+def earlier_of(given: Any, near: Epoch, chosen: str | None = None) -> Earlier:
+    """The orbit of ``--prior``.
+
+    Parameters
+    ----------
+    given : a determination, its JSON or .nc; an OEM or OPM with covariances, two-line elements, or an `Ephemeris` of one
+    near : the first measurement; of many states with a covariance the one that is nearest
+    chosen : name of the object, in a file of several
+
+    Raises
+    ------
+    ValueError
+        For an orbit without a covariance, or one that was not determined.
+    OSError
+        Where a file cannot be read.
+    """
+    facts = given.to_dict() if hasattr(given, "to_dict") else given
+    if isinstance(facts, str | os.PathLike):
+        facts = _facts_of(facts) or facts
+    name = os.fspath(given) if isinstance(given, str | os.PathLike) else "the prior"
+    if isinstance(facts, Mapping):
+        return _of_determination(facts, name)
+    start = start_of(given, near, chosen)
+    if start.covariance is None:
+        raise ValueError(f"--prior {name}: {start.source} has no covariance: it can be a --guess, no prior")
+    thumb = (f"the covariance of {name} is a rule of thumb, 1 km",) if "rule of thumb" in start.source else ()
+    return Earlier(start.epoch, start.state, start.covariance, name, assumed=thumb)
+
+
+def _facts_of(path: str | os.PathLike[str]) -> Mapping[str, Any] | None:
+    """The object of a determination in a file of its own; None for any other file."""
+    name = os.fspath(path)
+    with opened(path) as file:
+        start = file.read(512)
+        if start.startswith(hdf5.SIGNATURE):
+            text: Any = None
+        elif start.lstrip().startswith(b"{"):
+            text = start + file.read(LARGEST)
+        else:
+            return None
+    if text is None:
+        with hdf5.opened(path) as root:
+            text = root.attrs.get("determination")
+        if not isinstance(text, str):
+            raise ValueError(f"--prior {name}: the file holds no determination")
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise ValueError(f"--prior {name}: no JSON of a determination")
+    return found
+
+
+def _of_determination(facts: Mapping[str, Any], name: str) -> Earlier:
+    if facts.get("schema") != SCHEMA:
+        raise ValueError(f"--prior {name}: the schema is {str(facts.get('schema'))[:60]!r}, not {SCHEMA!r}")
+    if not facts.get("determined"):
+        raise ValueError(f"--prior {name}: that orbit is not determined: it can be a --guess, no prior")
+    try:
+        epoch, frame = date(str(facts["epoch"]), f"{name}: epoch"), frame_named(str(facts["frame"]))
+        names = [str(n) for n in facts["names"]]
+        mean, P = np.array(facts["mean"], dtype=float), np.array(facts["covariance"], dtype=float)
+        if P.shape != 2 * (len(names),) or not (np.isfinite(mean).all() and np.isfinite(P).all()):
+            raise ValueError("the covariance is not finite, or not of these names")
+        order = [names.index(n) for n in STATES]
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"--prior {name}: the determination has no state with a covariance: {error}") from None
+    factor, assumed = _inflated(facts, name)
+    P = P * factor**2
+    J = in_axes(frame, "GCRF", [epoch])[0]
+    constants = {n: (float(mean[i]), float(P[i, i])) for i, n in enumerate(names) if n not in STATES and P[i, i] > 0}
+    about, state = str(facts.get("about", "earth")), J @ mean[order]
+    return Earlier(epoch, state, J @ P[np.ix_(order, order)] @ J.T, name, constants, _used(facts), assumed, about)
+
+
+def _inflated(facts: Mapping[str, Any], name: str) -> tuple[float, tuple[str, ...]]:
+    """What sigmas are multiplied by, as in products, where that verdict called them too small."""
+    with suppress(KeyError, TypeError, ValueError):
+        honest = facts["verdict"]["honest"]
+        factor = float(honest["figure"])
+        if honest["ok"] is False and factor > 1.0:
+            return factor, (f"sigmas of {name} are taken {factor:.3g} times as large, as its residuals were",)
+    return 1.0, ()
+
+
+def _used(facts: Mapping[str, Any]) -> tuple[Epoch, Epoch] | None:
+    """First and last measurement, those of the orbits that it began with among them."""
+    try:
+        first, last = (Epoch(str(facts["span"][key])) for key in ("first", "last"))
+        before = facts.get("prior") or {}
+        return (min(first, Epoch(str(before["first"]))), last) if before.get("first") else (first, last)
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def fresh(rows: Observations, earlier: Earlier, since: Epoch | None) -> Observations:
+    """The measurements that an earlier orbit has not used, the others counted.
+
+    Raises
+    ------
+    ValueError
+        Where nobody says which it has used, or none is left.
+    """
+    if since is not None:
+        old = rows.t < since - rows.epoch - 1e-9
+    elif earlier.used is not None:
+        first, last = (when - rows.epoch for when in earlier.used)
+        old = (rows.t >= first - 1e-3) & (rows.t <= last + 1e-3)
+    else:
+        raise ValueError(
+            f"--prior {earlier.source}: which measurements is it made of? Say from when on they are new, with --from DATE"
+        )
+    count = int(np.count_nonzero(old & rows.measured))
+    if not (rows.measured & ~old).any():
+        raise ValueError(f"--prior {earlier.source}: it has used all {count:,} measurements already: there is none that is new")
+    if not count:
+        return rows
+    return replace(rows[~old], left_out=(*rows.left_out, (f"measurements that {earlier.source} has used already", count)))
+
+
+def root_of(covariance: Array) -> Array:
+    """Lower triangular root of a covariance, in which what is singular is rounding."""
+    return definite_root(0.5 * (covariance + covariance.T))
