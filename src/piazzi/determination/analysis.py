@@ -46,13 +46,14 @@ class Analysis:
         blocks = solved.reshape(self.rows.shape)
         return np.asarray(blocks @ np.swapaxes(blocks, 1, 2))
 
-    def step(self, keep: Array, root: Array, scale: Array) -> float:
-        """How far one more step of Gauss and Newton would go in the directions that are seen, in sigma of the solution."""
+    def toward(self, keep: Array, root: Array, scale: Array) -> tuple[Array, float]:
+        """The next step (n,) of Gauss and Newton in directions that are seen, in units of `scale`; its length in sigma."""
         n = self.rows.shape[2]
         whitened = np.nan_to_num(self.whitened[keep]).reshape(-1)
         J = np.vstack([np.nan_to_num(self.rows[keep]).reshape(-1, n), self.prior]) * scale
         gradient = J.T @ np.concatenate([whitened, self.prior_miss])
-        return float(np.linalg.norm(np.linalg.lstsq(root.T, gradient, rcond=NEGLIGIBLE)[0]))
+        turned = np.linalg.lstsq(root.T, gradient, rcond=NEGLIGIBLE)[0]
+        return np.linalg.lstsq(root, turned, rcond=NEGLIGIBLE)[0], float(np.linalg.norm(turned))
 
 
 def analysed(given: Setup, states: Array) -> Analysis:

@@ -111,6 +111,10 @@ class Case:
         read.duration,
         section=("product", "step"),
     )
+    hold: Any = said(
+        None, "ROWS", "Rows to predict without them: last, passes (each in turn), or a share such as 1/4.  "
+        "[default: passes, where there are 3 to 60]", read.hold,
+    )  # fmt: skip
     covariance: str = asked(
         "scaled", "KIND", "Covariances that the verdict calls too small: scaled, as the file says then, or formal.  "
         "[default: scaled]", choices=("scaled", "formal"),

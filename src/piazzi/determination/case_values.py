@@ -144,3 +144,13 @@ def texts(value: Any, where: str) -> tuple[str, ...]:
     if not all(isinstance(one, str) for one in found):
         raise ValueError(f"{where} is {one_line(repr(value), 60)}; it must be text, or a list of texts")
     return found
+
+
+def hold(value: Any, where: str) -> Any:
+    """Rows to hold back, as text or a share."""
+    from piazzi.determination.holding import check
+
+    try:
+        return check(value)
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from None

@@ -20,6 +20,7 @@ from piazzi.determination.earlier import Earlier, earlier_of, fresh
 from piazzi.determination.editing import edited
 from piazzi.determination.fit import begun, estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
+from piazzi.determination.holding import Held, held, unasked
 from piazzi.determination.instruments import with_instruments
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
 from piazzi.determination.result import Determination
@@ -60,6 +61,7 @@ def determine(
     frame: str | None = None,
     about: str | None = None,
     object: str | None = None,  # noqa: A002  # as everywhere
+    hold: Any = None,
     announce: Callable[[str], None] | None = None,
     notes: Mapping[str, Any] | None = None,
     **conventions: Any,
@@ -87,6 +89,8 @@ def determine(
     frame : axes of the answer, default GCRF, about the Sun ICRF; and of fixes whose file does not say them
     about : "earth" or "sun"; default the Sun where directions fit no orbit about the Earth
     object : name of what to determine, in files of several
+    hold : rows to predict without them: "last", "passes" (each in turn), or a share such as "1/4"; default each pass where
+        there are 3 to 60 and the orbit has no process noise
     announce : called with the name of each step as it begins
     notes : kept in the result: the command
     conventions : what the files do not say, as `read_tracking` takes it: ``range="two-way"``, ``sigma=["range.BER=10m"]``
@@ -203,11 +207,22 @@ def solved(
         found[name] = estimate(given, estimator, keep)
     seconds = time.perf_counter() - started
     announce("testing")
-    sentences = verdict(given, answer, found, analysis, keep, reasons)
     case = Case() if case is None else case
+    unseen = _unseen(given, chosen[answer], found[answer], analysis, keep, case.hold)
+    sentences = verdict(given, answer, found, analysis, keep, reasons, unseen)
     return Determination(
-        given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}), case
+        given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}), case, unseen
     )
+
+
+def _unseen(
+    given: Setup, estimator: Estimator, answer: Estimate, analysis: Analysis | None, keep: Array, hold: str | float | None
+) -> Held | None:
+    """What rows that are held back say of the answer; None where there is nothing to hold back."""
+    how = hold or unasked(given, keep)
+    if how is None or analysis is None or not answer.success or (given.problem.is_noise_free and answer.view != "delayed"):
+        return None
+    return held(given, estimator, answer, analysis, keep, how)
 
 
 def _answered(given: Setup, estimator: Estimator) -> tuple[Array, Array, Estimate, Analysis | None]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination import holding
 from piazzi.determination.guesses import SCHEMA
 from piazzi.determination.orbit import definite_root, jacobian
 from piazzi.determination.residuals import groups, rejected
@@ -46,6 +47,7 @@ def document(found: Any) -> dict[str, Any]:
         "residuals": groups(found),
         "rejected": rejected(found),
         "modes": list(found.modes) if known else [],
+        "held": None if found.held is None else holding.to_dict(found.setup, found.held, found.scale),
         "verdict": {key: sentence.to_dict() for key, sentence in found.verdict.items()},
         "forces": dict(found.setup.chosen.facts),
         "left_out": {**found.setup.chosen.left_out, **found.setup.measured.left_out},

@@ -12,6 +12,7 @@ import numpy as np
 from piazzi.determination.analysis import Analysis
 from piazzi.determination.beliefs import beliefs
 from piazzi.determination.case import Case
+from piazzi.determination.holding import Held
 from piazzi.determination.orbit import Orbit
 from piazzi.determination.setup import Setup, carried
 from piazzi.determination.verdict import DECISIVE, Sentence
@@ -42,6 +43,7 @@ class Determination:
     seconds : of all estimators together
     notes : further facts, as a result tells them: options, files
     case : what was asked for, products among it
+    held : what became of rows that were held back and predicted by the others, None where none were
     """
 
     setup: Setup
@@ -56,6 +58,7 @@ class Determination:
     seconds: float
     notes: Mapping[str, Any]
     case: Case = field(default_factory=Case)
+    held: Held | None = None
 
     @property
     def estimate(self) -> Estimate:

@@ -10,6 +10,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis
 from piazzi.determination.editing import STATION
+from piazzi.determination.holding import GOOD, Held
 from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate
@@ -49,9 +50,15 @@ class Sentence:
 
 
 def verdict(
-    given: Setup, name: str, estimates: Mapping[str, Estimate], analysis: Analysis | None, keep: Array, reasons: Array
+    given: Setup,
+    name: str,
+    estimates: Mapping[str, Estimate],
+    analysis: Analysis | None,
+    keep: Array,
+    reasons: Array,
+    held: Held | None = None,
 ) -> dict[str, Sentence]:
-    """The six of an answer, that of the first estimate."""
+    """The six of an answer, that of the first estimate; `held` is what became of rows that were held back."""
     answer = estimates[name]
     return dict(
         zip(
@@ -60,7 +67,7 @@ def verdict(
                 seen(given, analysis, keep),
                 alone(given),
                 converged(given, answer, analysis, keep),
-                honest(given, analysis, keep, reasons),
+                unseen(honest(given, analysis, keep, reasons), held),
                 agreed(given, name, estimates),
                 Sentence(None, None, "none yet", "Complete: what the forces leave out is not weighed against sigma yet."),
             ),
@@ -138,7 +145,7 @@ def converged(given: Setup, answer: Estimate, analysis: Analysis | None, keep: A
     if analysis is None or answer.view != "delayed" or not given.problem.is_noise_free or "weights" in answer.details:
         return Sentence(True, None, test, f"Converged: the estimator ended after {_count(answer.iterations, 'iteration')}.")
     scale = scale_of(given, given.states[0])
-    left = analysis.step(keep, analysis.information(keep, scale), scale)
+    left = analysis.toward(keep, analysis.information(keep, scale), scale)[1]
     if not left <= STILL:
         return Sentence(False, left, test, f"Not converged: another step would go {number(left, 2)} sigma.")
     return Sentence(
@@ -175,6 +182,23 @@ def honest(given: Setup, analysis: Analysis | None, keep: Array, reasons: Array)
     fits = f"residuals are {number(size, 3)} of their sigmas" if total < low else "residuals are as large as their sigmas say"
     note = ": these are cautious" if total < low else ""
     return Sentence(True, size, test, f"Honest: {fits}{note}.")
+
+
+def unseen(fitted: Sentence, held: Held | None) -> Sentence:
+    """The sentence on residuals with what became of rows that were predicted by the others."""
+    if held is None or not held.groups or not held.freedom:
+        return fitted
+    what = {"passes": "passes left out in turn", "last": "the last pass, left out,"}.get(held.how, "the last rows, left out,")
+    many = f"{len(held.groups)} " if held.how == "passes" else ""
+    found = (
+        f"{many}{what} are predicted with squared errors {number(held.nees, 2)} times what their covariances say "
+        f"({held.coverage:.0%} within 95 %)"
+    )
+    test = f"{fitted.test}; predictions of rows left out, up to {GOOD:g} times their covariances"
+    if held.honest or fitted.ok is False:
+        figure = fitted.figure if held.honest else max(fitted.figure or 0.0, float(np.sqrt(held.nees)))
+        return Sentence(fitted.ok, figure, test, f"{fitted.sentence.removesuffix('.')}; {found}.")
+    return Sentence(False, float(np.sqrt(held.nees)), test, f"Not honest: {found}.")
 
 
 def agreed(given: Setup, name: str, estimates: Mapping[str, Estimate]) -> Sentence:
