@@ -159,3 +159,12 @@ def test_a_table_of_fixes_is_tracking_for_a_scenario_without_stations(files):
     columns = "week=gps_week sow=gps_tow x=X[km] y=Y[km] z=Z[km]"
     words = ["--scenario", f"{files}/s.toml", "--columns", columns, "--frame", "GCRF", "--sigma", "2m", "--with", "batch"]
     assert main(["compare", f"{files}/a.csv", *words]) == 0
+
+
+def test_a_prior_that_is_later_than_the_file_begins_is_propagated_back(files):
+    r, v = pz.propagate_kepler(R, V, GM, T[6])
+    prior = f"[prior]\nmean = {[*r.tolist(), *v.tolist()]}\nsigma = [1.0, 1.0, 1.0, 0.1, 0.1, 0.1]\ntime = {T[6]}\n"
+    (files / "s.toml").write_text(f'epoch = "{EPOCH.to("UTC")}"\n' + SCENARIO + prior)
+    problem, tracking = recorded(files / "one.oem", files / "s.toml", Recording())
+    assert problem.prior_time == tracking.times[0] == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(problem.prior.mean, np.concatenate(pz.propagate_kepler(R, V, GM, 0.0)), rtol=1e-8)

@@ -26,6 +26,7 @@ from tests.fuzz.tracked import WORDS, Tracked, gently  # noqa: E402
 NAMES = [name for name, kind in FORMATS.items() if issubclass(kind, Tracked)]
 ANSWERS = {"range": "two-way", "tag": "transmit", "sigma": ["10m", "1mm/s", "1mrad"], "interval": 1, "angles": "apparent"}
 LONGEST = 20  # seconds that one input may take
+BLOCK = 2000  # inputs of a format before the next one has its turn
 MOST = 400  # inputs that led somewhere new and are damaged further
 
 
@@ -60,37 +61,55 @@ def fault(path: Path, said: str) -> str:
     return "the message is long" if len(said) > 2000 else ""
 
 
-def run(name: str, inputs: int, seed: int, place: Path, keep: Path) -> Counter[str]:
-    """Read so many damaged files of a format."""
-    rng, counts, kinds = random.Random(f"{seed} {name}"), Counter[str](), Counter[str]()
-    texts = FORMATS[name].texts(object.__new__(FORMATS[name]))
-    good = [text.encode() for text in texts]
-    found: list[bytes] = []
-    path = place / "a"
-    for k in range(inputs):
-        data = rng.choice(found if found and rng.random() < 0.4 else good)
-        data = gently(data, rng) if rng.random() < 0.6 else mutate.bytewise(data, rng, WORDS, good, 2**16)
+class Reader:
+    """Damaged files of one format, and what became of them."""
+
+    def __init__(self, name: str, seed: int, keep: Path) -> None:
+        texts = FORMATS[name].texts(object.__new__(FORMATS[name]))
+        self.name, self.keep, self.rng = name, keep, random.Random(f"{seed} {name}")
+        self.good, self.found = [text.encode() for text in texts], list[bytes]()
+        self.counts, self.kinds = Counter[str](), Counter[str]()
+        self.inputs, self.seconds = 0, 0.0
+
+    def read(self, inputs: int, path: Path) -> None:
+        """Read so many more."""
+        started = time.monotonic()
+        for _ in range(inputs):
+            self.once(path)
+        self.seconds += time.monotonic() - started
+
+    def once(self, path: Path) -> None:
+        """One more."""
+        rng, self.inputs = self.rng, self.inputs + 1
+        data = rng.choice(self.found if self.found and rng.random() < 0.4 else self.good)
+        data = gently(data, rng) if rng.random() < 0.6 else mutate.bytewise(data, rng, WORDS, self.good, 2**16)
         path.write_bytes(data)
         signal.alarm(LONGEST)
         try:
-            said = read(path, k)
+            said = read(path, self.inputs)
             wrong = fault(path, said)
         except Exception:  # what is looked for
             said, wrong = traceback.format_exc(), "a traceback"
         signal.alarm(0)
-        counts["read" if said in ("rows", "orbits") else "refused"] += 1
+        self.counts["read" if said in ("rows", "orbits") else "refused"] += 1
         shape = "".join(c for c in said.split("\n")[0] if not c.isdigit())[:60]
-        kinds[shape] += 1
-        if kinds[shape] == 1 and len(found) < MOST and len(data) < 2**14:
-            found.append(data)
+        self.kinds[shape] += 1
+        if self.kinds[shape] == 1 and len(self.found) < MOST and len(data) < 2**14:
+            self.found.append(data)
         if wrong:
-            counts[wrong] += 1
+            self.counts[wrong] += 1
             kind = said.strip().split("\n")[-1][:100]
-            kinds[kind] += 1
-            if kinds[kind] <= 2:
-                (keep / f"{name}-{k}").write_bytes(data)
-                (keep / f"{name}-{k}.txt").write_text(f"{wrong}\nway {k % 4}\n{said}")
-    return counts
+            self.kinds[kind] += 1
+            if self.kinds[kind] <= 2:
+                (self.keep / f"{self.name}-{self.inputs}").write_bytes(data)
+                (self.keep / f"{self.name}-{self.inputs}.txt").write_text(f"{wrong}\nway {self.inputs % 4}\n{said}")
+
+    @property
+    def bad(self) -> int:
+        return sum(n for what, n in self.counts.items() if what not in ("read", "refused"))
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.inputs} inputs, {dict(self.counts)}, {self.seconds:.0f} s"
 
 
 def _slow(number: int, frame: object) -> None:
@@ -108,15 +127,13 @@ def main() -> int:
     told.keep.mkdir(parents=True, exist_ok=True)
     signal.signal(signal.SIGALRM, _slow)
     warnings.simplefilter("ignore")
-    bad = 0
+    readers = [Reader(name, told.seed, told.keep) for name in told.formats or NAMES]
     with tempfile.TemporaryDirectory(prefix="readers-") as folder:
-        for name in told.formats or NAMES:
-            started = time.monotonic()
-            counts = run(name, told.inputs, told.seed, Path(folder), told.keep)
-            findings = sum(n for what, n in counts.items() if what not in ("read", "refused"))
-            bad += findings
-            print(f"{name}: {told.inputs} inputs, {dict(counts)}, {time.monotonic() - started:.0f} s", flush=True)
-    return 1 if bad else 0
+        while readers[-1].inputs < told.inputs:
+            for reader in readers:
+                reader.read(min(BLOCK, told.inputs - reader.inputs), Path(folder) / "a")
+            print(*readers, sep="\n", end="\n\n", flush=True)
+    return 1 if any(reader.bad for reader in readers) else 0
 
 
 if __name__ == "__main__":

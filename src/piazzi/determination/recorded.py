@@ -103,6 +103,9 @@ def _with_measurements(tables: Mapping[str, Any], found: Measured, path: str) ->
         out["prior"] = {**prior, **spread, "mean": _list(state, factors), "time": float(times[0]) / units.time()}
     elif isinstance(prior, Mapping) and "time" not in prior and isinstance(usual, Mapping) and "start" in usual:
         out["prior"] = {**prior, "time": usual["start"]}
+    stands = out.get("prior", {}).get("time") if isinstance(prior, Mapping) else None
+    if isinstance(stands, int | float):  # a prior later than the file begins is propagated back to it
+        out["times"] = {"list": [max(float(times[0]) / units.time(), float(stands))]}
     return out
 
 
