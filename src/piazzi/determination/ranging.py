@@ -10,7 +10,7 @@ import numpy as np
 
 from piazzi.determination.parts import Part
 from piazzi.determination.sites import Context, weather_of
-from piazzi.earth import laser_sphere, sensors
+from piazzi.earth import Station, laser_sphere, sensors
 from piazzi.formats import TAGS, Segment
 from piazzi.problem.checks import Array
 
@@ -24,6 +24,7 @@ class Way(NamedTuple):
     path: str
     tag: str
     troposphere: str | None
+    transmitter: Station | None = None
 
 
 def ranges(context: Context, index: Array) -> Sequence[Part]:
@@ -78,13 +79,16 @@ def _part(context: Context, rows: Array) -> Part:
 def _sensor(way: Way, clocks: bool) -> Any:
     """The sensor, by a name that says what it is of."""
     name = "_".join(["range", *way.path.split("-"), way.tag, *(way.troposphere.split("-") if way.troposphere else [])])
-    return sensors.range(way.path, name=name, tag=way.tag, relativity=True, troposphere=way.troposphere, time_bias=clocks)
+    return sensors.range(
+        way.path, name=name, tag=way.tag, relativity=True, troposphere=way.troposphere, time_bias=clocks,
+        transmitter=way.transmitter,
+    )  # fmt: skip
 
 
 def way_of(context: Context, segment: Segment, tag_index: int) -> Way:
     """Path, tag and medium of a segment's ranges or rates; raises ValueError for what is open, or not taken yet."""
     tag = TAGS[tag_index] or segment.tag
-    if segment.way not in ("one-way", "two-way"):
+    if segment.way not in ("one-way", "two-way", "three-way"):
         what = (
             f"{segment.way} ranges are" if segment.way else "ranges of a path that the file does not say (--range two-way) are"
         )
@@ -97,7 +101,21 @@ def way_of(context: Context, segment: Segment, tag_index: int) -> Way:
     if tag is None:
         tag = "bounce"
         context.said["times are those of the bounce (--tag transmit or receive says otherwise)"] = None
-    return Way(segment.way, EVENTS[tag], _troposphere(context, segment))
+    return Way(segment.way, EVENTS[tag], _troposphere(context, segment), _transmitter(context, segment))
+
+
+def _transmitter(context: Context, segment: Segment) -> Station | None:
+    """The station that sent a three-way signal, which is one for all of them."""
+    if segment.way != "three-way":
+        return None
+    if not segment.path:
+        raise ValueError(f"{context.where}the file does not say which station sent the three-way signals")
+    sender = segment.path[0]
+    others = {one.path[0] for one in context.observations.segments if one.way == "three-way" and one.path}
+    if len(others) > 1:
+        who = ", ".join(sorted(others))
+        raise ValueError(f"{context.where}three-way signals of several transmitters ({who}) are not determined from yet")
+    return context.site(context.observations.participants.index(sender))
 
 
 def _troposphere(context: Context, segment: Segment) -> str | None:

@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 from piazzi.determination.parts import Part
-from piazzi.determination.ranging import passes, way_of
+from piazzi.determination.ranging import Way, passes, way_of
 from piazzi.determination.sites import Context
 from piazzi.earth import sensors
 from piazzi.problem.checks import Array
@@ -38,7 +38,7 @@ def _part(context: Context, rows: Array, averaged: bool) -> Part:
         if segment.interval_reference is None:
             raise ValueError(f"{context.where}of which part of the count are times? --interval-reference start, middle or end")
         count, numbers = segment.interval_reference, {"count": float(segment.interval)}
-    sensor = _sensor(way.path, way.tag, count, context.clocks)
+    sensor = _sensor(way, count, context.clocks)
     given = sensor.at(site, context.epoch, 1.0, **numbers)
     whole = 0.5 if segment.range_is == "sum" and way.path != "one-way" else 1.0
     sigma = whole * observations.sigma[rows]
@@ -49,6 +49,6 @@ def _part(context: Context, rows: Array, averaged: bool) -> Part:
 
 
 @lru_cache(maxsize=64)
-def _sensor(path: str, tag: str, count: str | None, clocks: bool) -> Any:
-    name = "_".join(["range_rate", *path.split("-"), tag, *([count] if count else [])])
-    return sensors.range_rate(path, name=name, tag=tag, count=count, time_bias=clocks)
+def _sensor(way: Way, count: str | None, clocks: bool) -> Any:
+    name = "_".join(["range_rate", *way.path.split("-"), way.tag, *([count] if count else [])])
+    return sensors.range_rate(way.path, name=name, tag=way.tag, count=count, time_bias=clocks, transmitter=way.transmitter)

@@ -11,6 +11,7 @@ import numpy as np
 from piazzi.determination.centres import Centre, centre_of
 from piazzi.determination.directions import AZEL, RADEC, ascensions, azimuths
 from piazzi.determination.fixes import fixes
+from piazzi.determination.frequencies import frequencies
 from piazzi.determination.parts import Part
 from piazzi.determination.ranging import ranges
 from piazzi.determination.rates import rates
@@ -30,6 +31,7 @@ MAKERS: Mapping[tuple[str, ...], Callable[[Context, Array], Sequence[Part]]] = {
     AZEL: azimuths,
     RADEC: ascensions,
     ("range_rate", "range_rate_averaged"): rates,
+    ("receive_frequency",): frequencies,
 }
 
 
