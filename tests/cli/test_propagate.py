@@ -81,7 +81,7 @@ def test_covariances_of_other_axes_are_turned(call, tmp_path, axes):
 
 def test_the_forces_of_the_height_are_said(call, opm):
     text = call("propagate", opm, "--to", "0").out
-    assert "drag (exponential) (default at " in text
+    assert "drag (harris-priester) (default at " in text
     assert "Assumed: cr_a_m = 0.013 m2/kg, cd_a_m = 0.022 m2/kg" in text
 
 

@@ -9,6 +9,7 @@ import piazzi as pz
 from piazzi import earth
 from piazzi.determination import Guess, measured
 from piazzi.determination.approach import approached
+from piazzi.determination.common import LASER, with_common_errors
 from piazzi.determination.determining import prepared, solved
 from piazzi.determination.fit import estimators
 from piazzi.estimate.chi_square import quantile
@@ -73,6 +74,49 @@ def test_covariance_is_honest_over_seeds(given):
         scale = np.sqrt(np.diag(P))
         total += error / scale @ np.linalg.solve(P / np.outer(scale, scale), error / scale)
     assert quantile(0.0005, 6 * runs) < total < quantile(0.9995, 6 * runs)
+
+
+def with_biases(given, seed, size):
+    """Noise, and a bias of each pass, whose rows are 300 s apart and the next ones' two hours later."""
+    rng = np.random.default_rng(seed)
+    t = given.tracking.row_times
+    of_pass = np.concatenate([[0], np.cumsum(np.diff(t) > 1000.0)])
+    z = given.tracking.values + size * rng.standard_normal(12)[of_pass][:, None]
+    shifted = pz.Tracking(t, z, given.tracking.row_stations, epoch=given.tracking.epoch)
+    return noisy(replace(given, tracking=shifted), 100 + seed)
+
+
+def test_biases_of_passes_are_looked_for_and_found_only_where_there_are_some(given):
+    clean = [approached(noisy(given, seed)) for seed in range(6)]
+    assert all(with_common_errors(one) is one for one in clean)
+    one = approached(with_biases(given, 3, 0.1))
+    found = with_common_errors(one)
+    new = found.problem.model.constants
+    assert len(new) == 12 and set(found.measured.parameters) == set(new)
+    assert found.labels["range_bias_1"].name == "bias.range.7090/1"
+    assert "in its pass 2016-02-13 12:00 to 12:20" in found.labels["range_bias_1"].words
+    assert "bias of each pass" in found.assumed[-1]
+    picked = np.array([[dict(s.numbers)[f"is_{name}"] for name in new] for s in found.problem.stations])
+    assert (picked.sum(axis=1) == 1.0).all() and (picked.sum(axis=0) == 1.0).all()
+    assert np.array_equal(found.states[:, :6], one.states[:, :6])
+    said = replace(one, measured=replace(one.measured, parameters={"range_bias_1": ("estimated", pz.Gaussian(0.0, 1.0))}))
+    assert with_common_errors(said) is said
+
+
+@pytest.mark.slow
+def test_biases_of_passes_are_no_outliers_and_leave_honest_covariances(given):
+    runs, total = 8, 0.0
+    for seed in range(runs):
+        one = with_common_errors(approached(with_biases(given, seed, LASER)))
+        if not one.measured.parameters:
+            continue
+        found = solved(one, estimators(("graph",)))
+        assert found.determined and found.keep.mean() > 0.9
+        error = found.estimate.mean[-1, :6] - given.states[-1]
+        P = found.estimate.covariance[-1, :6, :6]
+        scale = np.sqrt(np.diag(P))
+        total += error / scale @ np.linalg.solve(P / np.outer(scale, scale), error / scale)
+    assert quantile(0.0005, 6) < total < quantile(0.9995, 6 * runs)
 
 
 @pytest.mark.slow

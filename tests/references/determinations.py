@@ -1,6 +1,7 @@
 """Simulated determinations whose truth is drawn from what is assumed before: consistency of every estimated value.
 
-``python -m tests.references.determinations KIND N`` prints the mean NEES over N runs of each kind: leo, geo, gto.
+``python -m tests.references.determinations KIND N`` prints the mean NEES over N runs of a kind, leo, geo or gto; of air,
+process and other that of predictions, along R, T and N after one, two and three days.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from piazzi.earth.tabulated import Place
 from piazzi.estimate.chi_square import quantile
 from piazzi.evaluate.information import predicted
 from piazzi.formats import Correction, Observations, Segment
+from piazzi.orbit import state_axes
 from piazzi.problem.inputs import prepare
 
 EPOCH = pz.Epoch("2024-03-10T00:00:00 UTC")
@@ -150,6 +152,65 @@ def consistency(kind, count, first=0, given=None):
     return names, np.array(out)
 
 
+AIR = Kind(
+    orbit(6828e3, 0.001, 97.3), ("NORTH", "WEST", "SOUTH"), 24.0, 20.0, 5.0,
+    "gravity=EGM2008 degree=12 drag=harris-priester radiation=no cd_a_m=0.02", "cd=0.5",
+)  # fmt: skip
+PROCESS = replace(AIR, estimate="cd=0.5 cd~24h=0.32")
+PIECE = 3600.0  # s, in which the density of a truth keeps to its share
+
+
+def flown(given, first, times, share):
+    """States (K, n) of an orbit whose coefficient of drag is multiplied by 1 + share, another in each hour."""
+    place = given.problem.model.names.index("cd_a_m")
+    out, x, t, mean = [], first.copy(), float(times[0]), first[place]
+    for k, part in enumerate(share):
+        end = min(PIECE * (k + 1), float(times[-1]))
+        inside = times[(times > t) & (times <= end)]
+        x[place] = mean * (1.0 + part)
+        nodes = np.unique(np.concatenate([[t], inside, [end]]))
+        states = follow(given.problem, nodes, x, given.chosen.max_step)[0]
+        out.append(states[np.isin(nodes, inside if k else np.concatenate([times[:1], inside]))])
+        x, t = states[-1].copy(), end
+        if t >= times[-1]:
+            break
+    return np.concatenate(out)
+
+
+def predictions(kind, count, other=None, days=(1, 2, 3), first=0):
+    """NEES per axis R, T, N (count, days, 3) of predictions, where the density of the truth varies, or is another model's."""
+    given = begun(kind)
+    truth = given if other is None else begun(other)
+    names = truth.problem.model.names
+    rows, last = given.tracking.times, float(given.tracking.times[-1])
+    ahead = np.array([last + 86400.0 * day for day in days])
+    times = np.concatenate([rows, ahead])
+    out = []
+    for seed in range(first, first + count):
+        rng = np.random.default_rng(seed)
+        hours = int(times[-1] // PIECE) + 2
+        share, left = np.zeros(hours), np.exp(-PIECE / 86400.0)
+        share[0] = 0.32 * rng.standard_normal()
+        for k in range(1, hours):
+            share[k] = left * share[k - 1] + 0.32 * np.sqrt(1 - left**2) * rng.standard_normal()
+        start = truth.states[0].copy()
+        start[:6] += np.repeat(kind.off, 3) * rng.standard_normal(6)
+        start[names.index("cd_a_m")] = 0.02 * (1 + 0.3 * rng.standard_normal())
+        states = flown(truth, start, times, share if other is None else 0.0 * share)
+        z = predicted(truth.problem, prepare(truth.problem, truth.tracking), states[: len(rows)])
+        z = z + kind.sigma * rng.standard_normal(z.shape)
+        tracking = pz.Tracking(given.tracking.row_times, z, given.tracking.row_stations, epoch=given.tracking.epoch)
+        found = solved(approached(replace(given, tracking=tracking)), estimators(("graph",)))
+        each = []
+        for k, t in enumerate(ahead.tolist()):
+            when = given.measured.epoch + t
+            axes = state_axes(states[len(rows) + k, :3], states[len(rows) + k, 3:6])
+            error = axes[:3, :3] @ (found.orbit.at(when)[:3] - states[len(rows) + k, :3])
+            each.append(error**2 / np.diag(found.orbit.covariance(when, "RTN"))[:3])
+        out.append(each)
+    return np.array(out)
+
+
 def within(values, degrees, sure=0.9995):
     """Whether sums of squares over runs are such as those of chi-square, by column."""
     n = len(values)
@@ -165,5 +226,13 @@ def main(name, count):
         print(f"{name:4} {label:50} {mean / d:6.3f}  {'in' if ok else 'OUT'}")
 
 
+def main_predictions(name, count):
+    kinds = {"air": (AIR, None), "process": (PROCESS, None)}
+    kinds["other"] = AIR, replace(AIR, forces=AIR.forces.replace("harris-priester", "exponential air_height=450000"))
+    found = predictions(kinds[name][0], count, kinds[name][1])
+    for k, day in enumerate((1, 2, 3)):
+        print(f"{name:8} {day} d  " + "  ".join(f"{a} {m:7.3f}" for a, m in zip("RTN", found[:, k].mean(axis=0), strict=True)))
+
+
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]))
+    (main if sys.argv[1] in KINDS else main_predictions)(sys.argv[1], int(sys.argv[2]))

@@ -7,6 +7,7 @@ from math import ceil
 
 import numpy as np
 
+from piazzi.determination.density import departure
 from piazzi.determination.setup import Setup, follow
 from piazzi.earth import Epoch
 from piazzi.estimate.estimator import Estimate
@@ -31,7 +32,7 @@ def beliefs(given: Setup, estimate: Estimate, epochs: Sequence[Epoch], factor: f
     for k in np.unique(base):
         own = np.flatnonzero(base == k)
         mean[own], P[own] = _from(given, estimate, int(k), t[own])
-    return mean[:, :6], P[:, :6, :6] * factor**2
+    return mean[:, :6], (P[:, :6, :6] + departure(given, estimate, t)) * factor**2
 
 
 def _from(given: Setup, estimate: Estimate, k: int, t: Array) -> tuple[Array, Array]:

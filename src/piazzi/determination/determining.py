@@ -16,6 +16,7 @@ from piazzi.determination.approach import approached
 from piazzi.determination.burns import burns_of
 from piazzi.determination.case import Case
 from piazzi.determination.case_file import split
+from piazzi.determination.common import with_common_errors
 from piazzi.determination.earlier import Earlier, earlier_of, fresh
 from piazzi.determination.editing import edited
 from piazzi.determination.fit import begun, estimate, estimators
@@ -122,7 +123,9 @@ def determined(
     given = prepared(*tracking, case=case)
     say("approaching")
     centre = given.measured.centre
-    return solved(approached(given), chosen, axes or centre.frame, scale or centre.scale, say, notes or {}, case)
+    return solved(
+        with_common_errors(approached(given)), chosen, axes or centre.frame, scale or centre.scale, say, notes or {}, case
+    )
 
 
 def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:

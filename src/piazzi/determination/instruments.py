@@ -18,7 +18,8 @@ from piazzi.determination.unknowns import BIAS, CLOCK, PASS, Asked, Label
 from piazzi.earth.sensors import Instrument
 from piazzi.model import Sensor
 from piazzi.model.renaming import renamed, with_names
-from piazzi.problem import Gaussian
+from piazzi.problem import Gaussian, Tracking
+from piazzi.problem.checks import Array
 from piazzi.text import nearest, one_line
 
 TIMES = 10.0  # times the noise of its rows is the sigma of a bias that nobody gives one
@@ -67,20 +68,31 @@ def with_instruments(seen: Measured, given: Sequence[Asked]) -> Measured:
 
 def passes(seen: Measured) -> tuple[list[int], dict[tuple[str, int], str]]:
     """The pass of each station of the problem, counted from 1 for each place, and from when to when each is."""
-    row_label = np.array([seen.labels[name] for name in seen.tracking.row_stations], dtype=object)
-    there = np.isfinite(seen.tracking.values).any(axis=1)
-    number = np.zeros(len(row_label), dtype=np.int64)
+    number, every = np.zeros(len(seen.tracking.row_times), dtype=np.int64), pass_of_rows(seen, seen.tracking)
     said: dict[tuple[str, int], str] = {}
-    for label in dict.fromkeys(row_label.tolist()):
-        own = np.flatnonzero((row_label == label) & there)
-        t = seen.tracking.row_times[own]
-        number[own] = 1 + np.concatenate([[0], np.cumsum(np.diff(t) > GAP)])
-        for k in range(1, int(number[own].max(initial=0)) + 1):
-            mine = t[number[own] == k]
-            first, last = ((seen.epoch + float(x)).to("UTC")[:16].replace("T", " ") for x in (mine[0], mine[-1]))
-            said[label, k] = f"{first} to {last[11:] if last[:10] == first[:10] else last}"
+    count: dict[str, int] = {}
+    for one in range(1, int(every.max(initial=0)) + 1):
+        own = np.flatnonzero(every == one)
+        label = seen.labels[seen.tracking.row_stations[own[0]]]
+        number[own] = k = count[label] = count.get(label, 0) + 1
+        ends = seen.tracking.row_times[own[[0, -1]]].tolist()
+        first, last = ((seen.epoch + x).to("UTC")[:16].replace("T", " ") for x in ends)
+        said[label, k] = f"{first} to {last[11:] if last[:10] == first[:10] else last}"
     of_station = [int(number[seen.tracking.row_stations == s.name].max(initial=0)) for s in seen.stations]
     return of_station, said
+
+
+def pass_of_rows(seen: Measured, tracking: Tracking) -> Array:
+    """Number of the pass (J,) of each row, from 1, each station's in order of time; 0 where nothing was measured."""
+    labels = np.array([seen.labels[name] for name in tracking.row_stations], dtype=object)
+    there = np.isfinite(tracking.values).any(axis=1)
+    out, last = np.zeros(len(labels), dtype=np.int64), 0
+    for label in dict.fromkeys(labels.tolist()):
+        own = np.flatnonzero((labels == label) & there)
+        if len(own):
+            out[own] = last + 1 + np.concatenate([[0], np.cumsum(np.diff(tracking.row_times[own]) > GAP)])
+            last = int(out[own[-1]])
+    return out
 
 
 def _constants(seen: Measured, one: Asked, before: Mapping[str, int]) -> list[Constant]:

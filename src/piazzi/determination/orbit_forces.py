@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from piazzi.determination.motion import Extra
 from piazzi.earth import ForceChoice, Forces, LaserSphere, laser_sphere, read_forces
 from piazzi.earth.defaults import AIR_BELOW, lowest_height
+from piazzi.earth.force_air import air
 from piazzi.earth.force_options import CONSTANT
 from piazzi.earth.stepping import longest_step
 from piazzi.problem import Gaussian
@@ -17,7 +20,15 @@ from piazzi.problem.checks import Array
 ACCELERATION = 1e-7  # m/s2: sigma of a constant acceleration
 STEPS = 200  # of order 8 in a turn at the pericentre's rate
 CR, CD = 1.13, 2.2  # coefficients of bodies whose mass and area are known
+AIR = "(variations as Emmert 2015, Adv. Space Res. 56, 773, reviews them)"
 COEFFICIENTS = {"cr": "cr_a_m", "cd": "cd_a_m"}
+
+
+class AirVaries(NamedTuple):
+    """By which share density departs from that of a fit, and over how many seconds it stays so."""
+
+    sigma: float
+    time: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +36,7 @@ class Chosen:
     """Forces with the roles and values of their parameters.
 
     `facts` is what a result tells of them, `left_out` what is not modelled, `assumed` where numbers came from, `extra` what
-    is added to them.
+    is added to them, `air_varies` what density does when nothing is measured any more.
     """
 
     choice: ForceChoice
@@ -36,6 +47,7 @@ class Chosen:
     left_out: Mapping[str, str] = field(default_factory=dict)
     assumed: tuple[str, ...] = ()
     extra: Extra = field(default_factory=Extra)
+    air_varies: AirVaries | None = None
 
     @property
     def forces(self) -> Forces:
@@ -74,11 +86,35 @@ def chosen_forces(
         "drag": forces.drag or None, "empirical": list(forces.empirical),
     }  # fmt: skip
     left_out = {}
-    if forces.drag in ("exponential", "harris-priester"):
-        left_out["density"] = "air does not follow the activity of the Sun from day to day, which may be half of the drag"
-    elif lowest_height(state[:3], state[3:]) < AIR_BELOW and not forces.drag:
+    varies, height = None, lowest_height(state[:3], state[3:])
+    if forces.drag:
+        varies = air_varies(height, forces.drag == "msis")
+        share, hours = f"{varies.sigma:.0%}", f"{varies.time / 3600:g} h"
+        assumed = (
+            *assumed,
+            f"behind the last measurement the air departs from the fit by {share}, correlated over {hours} {AIR}",
+        )
+    if varies is not None and forces.drag != "msis":
+        told = "as if F10.7 were 150" if forces.drag == "harris-priester" else "the same always"
+        cost = varies.sigma * _after_a_day(height, state, values.get("cd_a_m"))
+        left_out["density"] = f"air is {told}; what it varies by, {share}, moves the orbit up to {cost:.2g} m along in a day"
+    elif height < AIR_BELOW and not forces.drag:
         left_out["drag"] = "there is air at this height, and no drag among the forces"
-    return Chosen(choice, roles, values, facts, longest_step(state[:3], state[3:6], STEPS), left_out, assumed)
+    step = longest_step(state[:3], state[3:6], STEPS)
+    return Chosen(choice, roles, values, facts, step, left_out, assumed, air_varies=varies)
+
+
+def air_varies(height: float, weather: bool) -> AirVaries:
+    """Grows with height, as the Sun's activity matters more there; less where space weather is followed."""
+    share = float(np.interp(height, (300e3, 800e3), (0.2, 0.5)))
+    return AirVaries(0.5 * share, 6 * 3600.0) if weather else AirVaries(share, 86400.0)
+
+
+def _after_a_day(height: float, state: Array, coefficient: Any) -> float:
+    """How far drag as at the lowest point moves a satellite along its orbit in a day (m): 3/2 a t^2."""
+    density = air(min(max(height, 100e3), 1500e3))[0]
+    size = float(np.ravel(coefficient.mean)[0]) if isinstance(coefficient, Gaussian) else float(coefficient or 0.0)
+    return 1.5 * 0.5 * size * density * float(state[3:6] @ state[3:6]) * 86400.0**2
 
 
 def _choice(given: Any, state: Array) -> ForceChoice:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.analysis import Analysis
+from piazzi.determination.common import together
 from piazzi.determination.editing import STATION
 from piazzi.determination.holding import GOOD, Held
 from piazzi.determination.setup import WIDE, Setup, scale_of
@@ -173,6 +174,14 @@ def honest(given: Setup, analysis: Analysis | None, keep: Array, reasons: Array)
     total = float(squares.sum() + (analysis.prior_miss**2).sum())
     size = float(np.sqrt(total / free))
     high, low = quantile(SURE, free), quantile(1.0 - SURE, free)
+    shared = together(given, analysis, keep)
+    if total <= high and shared is not None and shared[0] > quantile(SURE, shared[1]):
+        size = float(np.sqrt(shared[0] / shared[1]))
+        return Sentence(
+            False, size, f"{test}; medians of passes likewise",
+            f"Not honest: residuals of a pass go together, by {number(size, 3)} times what their sigmas allow: "
+            "--estimate bias.KIND/pass stands for that.",
+        )  # fmt: skip
     if total > high:
         return Sentence(
             False, size, test,

@@ -120,7 +120,7 @@ def _usual(height: float) -> dict[str, Any]:
     degree = next((n for n in DEGREES if n >= wanted), DEGREES[-1])
     out: dict[str, Any] = {"degree": degree, "radiation": "cannonball"}
     if height < AIR_BELOW:
-        out |= {"drag": "exponential", "air_height": max(round(height, -4), 100e3)}
+        out |= {"drag": "harris-priester", "air_height": max(round(height, -4), 100e3)}
     return out
 
 

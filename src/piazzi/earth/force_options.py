@@ -11,7 +11,7 @@ USUAL = ("usual",)
 CONSTANT = ("radial", "along", "cross")
 ONCE_PER_REV = tuple(f"{name}_{wave}" for name in CONSTANT for wave in ("sin", "cos"))
 UNITS = {
-    "cr_a_m": "m^2/kg", "cd_a_m": "m^2/kg", "air_density": "kg/m^3", "air_height": "m", "air_scale": "m",
+    "cr_a_m": "m^2/kg", "cd_a_m": "m^2/kg", "air_density": "kg/m^3", "air_height": "m", "air_scale": "m", "dv": "m/s",
     **dict.fromkeys((*CONSTANT, *ONCE_PER_REV, *force_sun.NONGRAVITATIONAL), "m/s^2"),
 }  # fmt: skip
 _RELATIVITY = ("schwarzschild", "lense-thirring", "de-sitter")

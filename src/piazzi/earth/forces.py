@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -280,5 +281,5 @@ class Forces:
 
 
 def unit_of(name: str) -> str:
-    """The unit of a parameter of forces, "" for none."""
-    return UNITS.get(name, "")
+    """The unit of a parameter of forces, also of one of several that are numbered; "" for none."""
+    return UNITS.get(name, UNITS.get(re.sub(r"(_\d+)+$", "", name), ""))
