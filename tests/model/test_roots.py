@@ -1,11 +1,14 @@
 """Roots in dynamics, steps and rules; roots that are not found; light time and averaged Doppler against 50 digits."""
 
+import copy
+
 import mpmath as mp
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
+from piazzi.estimate.registry import parse
 from piazzi.scenarios.loader import load_scenario
 from piazzi.scenarios.table import ScenarioError
 
@@ -146,6 +149,18 @@ def test_the_message_names_the_root_and_the_station(estimator):
     found = estimator.estimate(p, tracking)
     assert not found.success
     assert "root 'tau' of station 'mast' has no solution at t = " in found.message and "\n" not in found.message
+
+
+@pytest.mark.parametrize("text", ["ekf", "srekf", "ukf", "window:5"])
+def test_a_session_names_them_too(text, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    live = parse(text).start(lossy(8))
+    for t in np.arange(0.0, 3.0, 0.25):
+        live.update("ruler", 2 - 0.5 * t, t)
+        live.update("mast", np.sqrt(max((2 - 0.5 * t) ** 2 - 1, 0.25)), t)
+    assert not live.success
+    assert "root 'tau' of station 'mast' has no solution at t = " in live.message and "\n" not in live.message
+    assert copy.copy(live).message == live.message
 
 
 def test_a_root_is_no_number_where_its_residual_is_too_large():

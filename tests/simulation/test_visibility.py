@@ -37,7 +37,8 @@ def problem(visible=VISIBLE, schedules=(None, None), masks=(MASK, MASK), **chang
         for name, place, schedule in zip(("a", "b"), places, schedules, strict=True)
     ]
     prior = pz.Gaussian.from_sigma([R, 0.0], [1e3, 1e3])
-    return pz.Problem(model, prior, None, stations, prior_time=0.0, **changes)
+    steps = {"integrator": pz.ConstantAcceleration(max_step=0.5)}  # in gaps too
+    return pz.Problem(model, prior, None, stations, prior_time=0.0, **steps | changes)
 
 
 TIMES = np.arange(0.0, 1200.0, 5.0)
@@ -174,7 +175,8 @@ def test_the_truth_may_have_another_mask():
         ["low"],
     )
     stations = [pz.Station(s.name, "radar", 100.0, {k: s.numbers[k] for k in ("px", "py")}) for s in one.stations]
-    given = pz.Problem(lower, one.prior, None, stations, {"low": 1.6}, prior_time=0.0, truth=pz.Truth(parameters={"low": MASK}))
+    truth = pz.Truth(parameters={"low": MASK})
+    given = pz.Problem(lower, one.prior, None, stations, {"low": 1.6}, one.integrator, prior_time=0.0, truth=truth)
     assert rows(simulate(given)).keys() == rows(simulate(one)).keys()
 
 
@@ -371,3 +373,28 @@ def test_every_epoch_stays_where_what_happens_depends_on_how_many_there_are(kind
     assert_array_equal(tracking.times, np.arange(20.0))
     assert_array_equal(np.isnan(tracking.values[:, 0]), tracking.truth[:, 0] <= 0)
     assert 0 < np.isnan(tracking.values).sum() < 20
+
+
+# ---- what visibility leaves between -----------------------------------------------------------------------------------
+
+
+def watched_once_a_turn(integrator):
+    """A mask that leaves half a minute of every ten, by one station."""
+    p = problem(masks=(np.radians(30), np.radians(89.9)), integrator=integrator)
+    return dataclasses.replace(p, truth=pz.Truth(integrator=pz.RungeKutta8(max_step=1.0)))
+
+
+def test_steps_that_are_too_long_for_a_gap_are_told_with_it_and_with_what_helps():
+    with pytest.warns(
+        UserWarning, match=r"gap from t = .* has 1 substep, .* 'a' .* sigma; give the integrator max_step=5 in"
+    ) as told:
+        tracking = simulate(watched_once_a_turn(pz.RungeKutta4(1)))
+    assert len(told) == 1 and "\n" not in str(told[0].message)
+    k = int(np.argmax(np.diff(tracking.times)))
+    for t in tracking.times[k : k + 2]:
+        assert f"t = {t:g} s" in str(told[0].message)
+
+
+@pytest.mark.parametrize("integrator", [pz.RungeKutta4(max_step=5.0), pz.RungeKutta4(300), pz.DormandPrince()])
+def test_nothing_is_told_where_steps_suit_the_gap(integrator):
+    simulate(watched_once_a_turn(integrator))  # warnings are errors

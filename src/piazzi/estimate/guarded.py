@@ -114,6 +114,8 @@ class GuardedLiveFilter(LiveFilter):
         )
         self.innovation[:], self.innovation_covariance[:] = innovations.nu[-1], innovations.S[-1]
         self.rejected, self._measured = bool(gate.rejected[-1]), True
+        if self._has_roots:
+            self._look_for_root(s, float(self._times[3]))
 
     def _saved_state(self) -> dict[str, Array]:
         return super()._saved_state() | {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}

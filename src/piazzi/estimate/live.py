@@ -211,12 +211,17 @@ class LiveFilter(Session):
         self._which[0] = s
         self._update()
         self._measured = True
+        if self._has_roots:
+            self._look_for_root(s, float(self._times[3]))
 
     # ---- what it stands on ---------------------------------------------------------------------------------------
 
     @property
     def _belief_time(self) -> float | None:
         return self.time
+
+    def _foretold(self, t: float) -> Array:
+        return self._x_pred
 
     def _beliefs(self) -> list[tuple[Array, Array]]:
         predicted = (self._base_mean, self._base_covariance), (self._x_pred, self._P_pred)

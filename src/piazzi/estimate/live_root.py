@@ -107,6 +107,8 @@ class LiveRootFilter(Session):
         gate, _, innovations = self._run()
         self.innovation, self.innovation_covariance = innovations.nu[-1].copy(), innovations.S[-1].copy()
         self.rejected = bool(gate.rejected[-1])
+        if self._has_roots and self.time is not None:
+            self._look_for_root(s, self.time)
 
     def _run(self) -> Results:
         """The epoch at `time`, with the rows that it has so far, from the belief before it."""
@@ -129,6 +131,10 @@ class LiveRootFilter(Session):
     @property
     def _belief_time(self) -> float | None:
         return self.time
+
+    def _foretold(self, t: float) -> Array:
+        since = t if self._clock.time is None else self._clock.time
+        return self.problem.step(self.base_mean, t - since, since)[0] if t > since else self.base_mean
 
     def _beliefs(self) -> list[tuple[Array, Array]]:
         return [(self.mean, self.covariance), (self.base_mean, self.covariance)]  # roots are of semidefinite ones

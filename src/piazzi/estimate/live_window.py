@@ -48,7 +48,7 @@ class LiveWindow(Session):
         not too wide for them beside the noise; else why not
     """
 
-    _shown: ClassVar[tuple[str, ...]] = ("refused", "widest")
+    _shown: ClassVar[tuple[str, ...]] = ("refused", "widest", "_lost")
 
     saved_names = (
         *("m", "P", "t", "count", "scale", "first_row", "z", "station", "x", "x_before"),
@@ -149,6 +149,8 @@ class LiveWindow(Session):
         self._solve_newest(late=k < window.stop - 1)
         if k < window.stop - 1:
             self._record_variance_ratio(k)
+        if self._has_roots:
+            self._look_for_root(s, t)
         return True
 
     def _begin(self, t: float) -> None:
@@ -287,6 +289,10 @@ class LiveWindow(Session):
     @property
     def _belief_time(self) -> float | None:
         return self.time if self._pending is None else self._pending
+
+    def _foretold(self, t: float) -> Array:
+        states: Array = self._window.x_before
+        return np.asarray(states[self._window.find(t)])
 
     def _beliefs(self) -> list[tuple[Array, Array]]:
         window, found = self._window, [(self.mean, self.covariance), self._newest, (self._m, self._P)]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from piazzi.kernels import KernelSpec, load_plain
+from piazzi.kernels.bundle import Given
 from piazzi.model import Model, Sensor
 from piazzi.model.functions import ROOT
 from piazzi.problem import Problem, Tracking
@@ -21,8 +23,7 @@ def lost_root(problem: Problem, tracking: Tracking, mean: Array) -> str:
 
     "" where all are found, or the model has none.
     """
-    model = problem.model
-    if not any(_roots(model, sensor) for sensor in model.sensors):
+    if not has_roots(problem.model):
         return ""
     try:
         return _lost(problem, tracking, mean)
@@ -30,25 +31,48 @@ def lost_root(problem: Problem, tracking: Tracking, mean: Array) -> str:
         return ""
 
 
+def lost_root_of(problem: Problem, s: int, t: float, x: Array) -> str:
+    """Words for the first root of station `s` without a solution at a time and state, "" where all are found."""
+    try:
+        return _lost_at(problem, s, t, x, problem.given_over(t, t))
+    except (ValueError, ArithmeticError):
+        return ""
+
+
+def has_roots(model: Model) -> bool:
+    """Whether a model has any."""
+    return any(_roots(model, sensor) for sensor in model.sensors)
+
+
 def _lost(problem: Problem, tracking: Tracking, mean: Array) -> str:
-    spec = problem.spec("transition", "functions")
-    probes = _probes(problem.model)
-    kernel = load_plain(KernelSpec(replace(problem.model, sensors=probes), spec.scheme, spec.fragments))
     finite = np.asarray(np.isfinite(mean).all(axis=1))
     begin = 0 if finite.all() else int(np.argmin(finite))
     given, stations = problem.given_over(*tracking.times[[0, -1]]), tracking.stations_of(problem)
     for k, x in _states(problem, tracking, mean, range(begin, min(begin + MOST_EPOCHS, len(finite)))):
         t = float(tracking.times[k])
         for row in range(tracking.first_row[k], tracking.first_row[k + 1]):
-            s = int(stations[row])
-            out = np.empty((1, max(p.width for p in probes)))
-            numbers, sensor = problem.station_numbers[s], int(problem.station_sensor[s])
-            kernel.evaluate_measurement(1, sensor, np.array([t]), x[None], given, numbers, out)
-            found = _roots(problem.model, problem.model.sensors[sensor])
-            for name, value in zip(found, out[0].tolist(), strict=False):
-                if np.isnan(value):
-                    return f"root {name!r} of station {problem.stations[s].name!r} has no solution at t = {t:g} s"
+            lost = _lost_at(problem, int(stations[row]), t, x, given)
+            if lost:
+                return lost
     return ""
+
+
+def _lost_at(problem: Problem, s: int, t: float, x: Array, given: Given) -> str:
+    kernel = load_plain(_probe(problem.spec("transition", "functions")))
+    numbers, sensor = problem.station_numbers[s], int(problem.station_sensor[s])
+    found = _roots(problem.model, problem.model.sensors[sensor])
+    out = np.empty((1, max(len(_roots(problem.model, each)) + each.width for each in problem.model.sensors)))
+    kernel.evaluate_measurement(1, sensor, np.array([t]), x[None], given, numbers, out)
+    for name, value in zip(found, out[0].tolist(), strict=False):
+        if np.isnan(value):
+            return f"root {name!r} of station {problem.stations[s].name!r} has no solution at t = {t:g} s"
+    return ""
+
+
+@lru_cache(maxsize=16)
+def _probe(spec: KernelSpec) -> KernelSpec:
+    """The module of a model whose sensors see the roots."""
+    return KernelSpec(replace(spec.model, sensors=_probes(spec.model)), spec.scheme, spec.fragments)
 
 
 def _states(problem: Problem, tracking: Tracking, mean: Array, epochs: range) -> Iterator[tuple[int, Array]]:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from functools import cached_property
+from math import isfinite
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from piazzi.estimate.lost_root import has_roots, lost_root_of
 from piazzi.estimate.soundness import defect
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -26,7 +29,9 @@ class Session(ABC):
     problem: Problem
     _settings: tuple[Any, ...]
     # What copies have and checkpoints need not: nothing to come depends on it
-    _shown: ClassVar[tuple[str, ...]] = ("innovation", "innovation_covariance")
+    _shown: ClassVar[tuple[str, ...]] = ("innovation", "innovation_covariance", "_lost")
+    mean: Array
+    _lost = ""  # the first root that was not found
 
     @property
     @abstractmethod
@@ -36,6 +41,19 @@ class Session(ABC):
     @abstractmethod
     def _beliefs(self) -> list[tuple[Array, Array]]:
         """Every mean (n,) with its covariance (n, n) that the next call depends on, that to be read first."""
+
+    @abstractmethod
+    def _foretold(self, t: float) -> Array:
+        """The state (n,) about which a measurement at `t`, the last one, was linearised."""
+
+    @cached_property
+    def _has_roots(self) -> bool:
+        return has_roots(self.problem.model)
+
+    def _look_for_root(self, s: int, t: float) -> None:
+        """After a measurement of station `s`: note what is lost, the first time that the belief is no number."""
+        if not (isfinite(self.mean.item(0)) or self._lost):
+            self._lost = lost_root_of(self.problem, s, t, self._foretold(t))
 
     @abstractmethod
     def _saved_state(self) -> dict[str, Array]:
@@ -59,7 +77,7 @@ class Session(ABC):
         t = self._belief_time
         place = "" if t is None else f"at t = {t:g} s"
         found = defect(np.array(means), np.array(covariances), self.problem.model.names, lambda k: place).rstrip()
-        return found or self._why_unusable()
+        return f"{found}: {self._lost}" if found and self._lost else found or self._why_unusable()
 
     def _why_unusable(self) -> str:
         """Why beliefs that look good cannot be used, "" where they can."""
@@ -82,6 +100,7 @@ class Session(ABC):
     def restore(self, saved: Mapping[str, Array]) -> None:
         """Go on from a checkpoint of the same problem; raises ValueError where it does not fit."""
         self._set_state(self._checked(saved))
+        self._lost = ""
 
     def __reduce__(self) -> tuple[Any, ...]:
         shown = {name: copy.copy(getattr(self, name)) for name in self._shown}

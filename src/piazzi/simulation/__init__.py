@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ from piazzi.problem.checks import Array, check_span, finite_vector, numeric
 from piazzi.problem.gaps import is_restricted
 from piazzi.problem.inputs import Inputs, wrapped
 from piazzi.problem.truth import true_problem
+from piazzi.simulation.long_gaps import gap_warning
 from piazzi.simulation.rule import MOST_DRAWS, NoTruthError, Rule
 from piazzi.simulation.visibility import rules, seen
 
@@ -64,7 +66,12 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
     states, z = propagate(problem, actual, epochs, index, first, w, v if truth_half.measurement_noise else None)
     names = np.array([s.name for s in problem.stations])[np.tile(index, K)] if len(problem.stations) > 1 else None
     whole = Tracking(np.repeat(epochs, len(index)), z, names, states, problem.epoch)
-    return _measured(problem, whole, seen(actual, epochs, states)[:, index]) if is_restricted(problem) else whole
+    if not is_restricted(problem):
+        return whole
+    tracking = _measured(problem, whole, seen(actual, epochs, states)[:, index])
+    if told := gap_warning(problem, tracking):
+        warnings.warn(told, stacklevel=2)
+    return tracking
 
 
 def _measured(problem: Problem, whole: Tracking, marks: Array) -> Tracking:
