@@ -73,9 +73,10 @@ def note_source(source: str, error: Exception) -> None:
 
 def _compiled(source: str) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     with own_settings(), _garbage_kept():
-        from piazzi.kernels.compiler import object_code
+        from piazzi.kernels.compiler import calls_resolved_once, object_code
 
-        module = module_of(source)
+        with calls_resolved_once():
+            module = module_of(source)
         callbacks = {name: (getattr(module, name), takes) for name, takes in signatures(source).items()}
         objects = {name: object_code(callback) for name, (callback, _) in callbacks.items()}
         symbols = {name: (callback.native_name, takes) for name, (callback, takes) in callbacks.items()}
