@@ -76,6 +76,10 @@ def test_what_is_printed_and_shown(folder):
         (["one.oem", "--guess", "a=7078km e=0.1 i=1deg raan=0deg argp=0deg nu=0deg"], "of which date"),
         (["one.oem", "--guess", "a=-7000km e=0.1 i=1deg raan=0deg argp=0deg nu=0deg epoch=2016-02-13Z"], "no orbit"),
         (["one.oem", "--guess", "nowhere.tle"], "No such file"),
+        (
+            ["one.oem", "--guess", "a=9000km e=0.6 i=1deg raan=0deg argp=0deg nu=0deg epoch=2016-02-13Z"],
+            "--guess: the orbit comes",
+        ),
         (["one.oem", "--forces", "gravty=EGM2008"], "did you mean 'gravity'"),
         (["one.oem", "--span", "first"], "two ends"),
         (["one.oem", "--estimate", "cd"], "no unknown"),

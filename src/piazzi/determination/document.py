@@ -28,7 +28,6 @@ def document(found: Any) -> dict[str, Any]:
         "object": found.object,
         "epoch": found.epoch.to(found.scale),
         "frame": found.frame,
-        "about": found.setup.measured.about,
         "names": list(model.names),
         "units": [model.unit(name) for name in model.names],
         "mean": _listed(mean),
@@ -53,6 +52,7 @@ def document(found: Any) -> dict[str, Any]:
         "left_out": {**found.setup.chosen.left_out, **found.setup.measured.left_out},
         "assumed": list(found.setup.assumed),
         "data": data(found),
+        "about": found.setup.measured.about,
         **({} if found.setup.earlier is None else {"prior": prior(found)}),
         **{key: value for key, value in found.notes.items() if key in ("estimators", "against", "command")},
     }

@@ -125,7 +125,8 @@ def _choice(given: Any, state: Array) -> ForceChoice:
     try:
         return read_forces("default" if given is None else str(given), lowest_height(state[:3], state[3:]))
     except ValueError as error:
-        raise ValueError(f"--forces: {str(error).removeprefix('forces: ')}") from None
+        option = "--guess" if "comes down to" in str(error) else "--forces"
+        raise ValueError(f"{option}: {str(error).removeprefix('forces: ')}") from None
 
 
 def _coefficients(

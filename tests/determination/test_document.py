@@ -1,0 +1,140 @@
+"""The result by its contract: keys and their order, units, counts, frames and scales, and that files say the same."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import piazzi as pz
+from piazzi import earth
+from piazzi.orbit import state_axes
+from tests.determination.fixing import EPOCH, observations, truth
+
+T = np.arange(0.0, 86400.0, 1800.0)
+SIGMA = 10.0
+KEYS = [
+    "schema", "object", "epoch", "frame", "names", "units", "mean", "sigma", "covariance", "elements", "success", "determined",
+    "message", "iterations", "seconds", "estimated", "considered", "manoeuvres", "span", "residuals", "rejected", "modes",
+    "verdict", "forces", "left_out", "assumed", "data",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def path():
+    return truth(T)[:, :3] + SIGMA * np.random.default_rng(1).standard_normal((len(T), 3))
+
+
+@pytest.fixture(scope="module")
+def found(path):
+    wrong = path.copy()
+    wrong[10] += 5e3
+    return pz.determine(observations(wrong, T, SIGMA))
+
+
+@pytest.fixture(scope="module")
+def facts(found):
+    return json.loads(json.dumps(found.to_dict(), allow_nan=False))
+
+
+def test_keys_are_those_of_the_schema_in_their_order(facts):
+    assert [key for key in facts if key in KEYS] == KEYS and list(facts)[: len(KEYS)] == KEYS
+    assert facts["schema"] == "piazzi.determine/1" and facts["frame"] == "GCRF" and facts["epoch"].endswith(" UTC")
+    assert facts["names"][:6] == ["x", "y", "z", "vx", "vy", "vz"] and facts["units"][:6] == ["m"] * 3 + ["m/s"] * 3
+    assert list(facts["elements"]) == ["names", "units", "mean", "sigma", "kind", "frame"]
+    assert list(facts["verdict"]) == ["seen", "alone", "converged", "honest", "agreed", "complete"]
+    assert all(list(one) == ["ok", "figure", "test", "sentence"] for one in facts["verdict"].values())
+    fields = ["station", "component", "unit", "count", "used", "mean", "rms", "weighted_rms"]
+    assert all(list(one) == fields for one in facts["residuals"])
+    assert all(list(one) == ["time", "station", "component", "residual", "sigma", "reason"] for one in facts["rejected"])
+    assert all(list(one)[:3] == ["probability", "mean", "weighted_rms"] for one in facts["modes"])
+    estimated = ["name", "unit", "prior", "prior_sigma", "value", "sigma"]
+    assert facts["estimated"] and all(list(one)[:6] == estimated for one in facts["estimated"])
+    assert_allclose(np.sqrt(np.diag(facts["covariance"])), facts["sigma"], rtol=1e-9)
+
+
+def test_counts_are_of_all_rows_and_of_those_used(found, facts):
+    assert [one["count"] for one in facts["residuals"]] == [len(T)] * 3
+    rows = found.residuals
+    for one in facts["residuals"]:
+        own = (rows["station"] == one["station"]) & (rows["kind"] == one["component"])
+        assert one["used"] == int(rows["used"].where(own, False).sum())
+        left = rows["o_minus_c"].values[own.values & rows["used"].values]
+        assert one["rms"] == pytest.approx(np.sqrt(np.mean(left**2))) and one["mean"] == pytest.approx(np.mean(left))
+    assert len(facts["rejected"]) == sum(one["count"] - one["used"] for one in facts["residuals"]) > 0
+
+
+def test_residuals_are_a_dataset_of_these_variables(found, path):
+    rows = found.residuals
+    names = {"time", "station", "kind", "observed", "computed", "o_minus_c", "sigma", "weight", "used", "reason"}
+    assert names <= set(rows.variables) and rows.sizes["measurement"] == 3 * len(T)
+    assert_allclose(rows["observed"] - rows["computed"], rows["o_minus_c"], atol=1e-6)
+    assert (rows["weight"].values[~rows["used"].values] == 0).all()
+    assert all(rows["reason"].values[~rows["used"].values] != "")
+    good = rows["used"].values
+    assert 0.7 < np.std(rows["o_minus_c"].values[good]) / SIGMA < 1.3
+
+
+def test_the_orbit_at_any_date_in_any_axes(found):
+    when = EPOCH + 3600.0
+    state = found.orbit.at(when)
+    there = found.orbit.to("ITRF").at(when)
+    r, v = earth.transform(state[:3], state[3:], "GCRF", "ITRF", when)
+    assert_allclose(there, [*r, *v], rtol=1e-12)
+    rtn = found.orbit.covariance(when, axes="RTN")
+    A = state_axes(state[:3], state[3:])
+    assert_allclose(rtn, A @ found.orbit.covariance(when) @ A.T, rtol=1e-6, atol=1e-12)
+    elements = found.orbit.elements()
+    assert elements["kind"] == "keplerian" and elements["names"][0] == "a"
+    energy = 0.5 * found.orbit.at()[3:] @ found.orbit.at()[3:] - 3.986004418e14 / np.linalg.norm(found.orbit.at()[:3])
+    assert elements["mean"][0] == pytest.approx(-3.986004418e14 / (2.0 * energy), rel=1e-7)
+    assert found.orbit.at("2015-05-05T01:00:00 UTC").tolist() == state.tolist()
+
+
+@pytest.mark.parametrize("epoch", ["2015-05-05T06:00:00 TT", "2015-05-05T06:00:00 TAI", "2015-05-05T06:00:00 GPS", None])
+def test_epochs_are_told_in_the_scale_that_was_asked_for(found, path, epoch):
+    other = pz.determine(observations(path, T, SIGMA), epoch=epoch, frame="EME2000")
+    told = other.to_dict()
+    assert told["frame"] == "EME2000" == told["elements"]["frame"]
+    scale = "UTC" if epoch is None else epoch.split()[1]
+    assert told["epoch"].endswith(f" {scale}")
+    assert abs(pz.Epoch(told["epoch"]) - (EPOCH + T[-1] if epoch is None else pz.Epoch(epoch))) < 1e-6
+    again = other.orbit.to("GCRF").at(EPOCH + 7200.0)
+    plain = pz.determine(observations(path, T, SIGMA)).orbit.at(EPOCH + 7200.0)
+    assert_allclose(again, plain, rtol=0, atol=1e-3)
+
+
+def test_products_hold_the_same_orbit(found, tmp_path):
+    found.write(tmp_path / "a.oem", span="first .. last+1h", step=600.0)
+    arc = pz.read_ephemeris(tmp_path / "a.oem").arcs[0]
+    assert_allclose(np.append(arc.position[7], arc.velocity[7]), found.orbit.at(arc.instant(7)), rtol=0, atol=1e-5)
+    for P, t in zip(arc.covariance[::30], arc.covariance_t[::30], strict=True):
+        np.linalg.cholesky(P)
+        assert_allclose(np.diag(P), np.diag(found.orbit.covariance(arc.epoch + float(t))), rtol=1e-6)
+    text = (tmp_path / "a.oem").read_text()
+    for sentence in found.verdict.values():
+        assert f"COMMENT {sentence.sentence[:60]}" in text
+    assert "COMMENT Measurements from" in text and "COMMENT Earth orientation of" in text
+    assert len(found.ephemeris(step=3600.0).arcs[0]) == 25
+    for name in ("a.opm", "a.ocm", "a.nc", "a.csv", "a.json"):
+        found.write(tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 500
+    with pytest.raises(ValueError, match="a product ends in"):
+        found.write(tmp_path / "a.xyz")
+    with pytest.raises(OSError, match="no folder"):
+        found.write(tmp_path / "nowhere" / "a.oem")
+
+
+def test_covariances_that_are_too_small_are_written_larger_and_it_is_said(path, tmp_path):
+    bold = pz.determine(observations(path, T, SIGMA / 3))
+    factor = bold.verdict["honest"].figure
+    assert bold.verdict["honest"].ok is False and 2 < factor < 4
+    for name, formal in (("scaled.opm", None), ("formal.opm", True)):
+        bold.write(tmp_path / name, formal=formal)
+    scaled, formal = (pz.read_ephemeris(tmp_path / f"{name}.opm").arcs[0].covariance[0] for name in ("scaled", "formal"))
+    assert_allclose(scaled, factor**2 * formal, rtol=1e-9)
+    said = (tmp_path / "scaled.opm").read_text(), (tmp_path / "formal.opm").read_text()
+    assert (
+        f"times {factor**2:.3g}: residuals are {factor:.3g}" in said[0]
+        and "Covariances are those of the fit, though" in said[1]
+    )
