@@ -8,13 +8,14 @@ from numpy.testing import assert_allclose
 import piazzi as pz
 from piazzi import earth
 from piazzi.determination import measured
+from piazzi.determination.case_file import CASES, split
 from piazzi.determination.centres import EARTH, SUN
 from piazzi.determination.guesses import Guess
 from piazzi.determination.orbit import ECLIPTIC, Orbit
+from piazzi.determination.sky import sight
 from piazzi.determination.unguided import goes_about_the_sun
 from piazzi.formats import Observations, Segment, read_tracking
 from piazzi.orbit import propagate_kepler
-from piazzi.scenarios.loader import FILES
 
 LIGHT, AU = 299792458.0, 149597870700.0
 EPOCH = pz.Epoch("2015-03-01T00:00:00 TDB")
@@ -157,7 +158,7 @@ def test_elements_about_the_sun_are_those_of_the_ecliptic():
 
 
 def ceres_table():
-    return read_tracking(FILES / "ceres-1801.txt", sigma="5arcsec")
+    return read_tracking(CASES / "ceres-1801.txt", sigma="5arcsec")
 
 
 def test_times_of_palermo_are_its_mean_time_from_noon():
@@ -196,7 +197,7 @@ def test_the_table_is_counted(data_dir):
 )
 def test_broken_tables_are_refused(tmp_path, change, says):
     path = tmp_path / "table.txt"
-    path.write_text((FILES / "ceres-1801.txt").read_text().replace(*change))
+    path.write_text((CASES / "ceres-1801.txt").read_text().replace(*change))
     with pytest.raises(ValueError, match=rf"table.txt: line \d+: .*{says}"):
         read_tracking(path)
 
@@ -233,3 +234,56 @@ def test_an_orbit_about_the_sun_is_found_without_a_word(data_dir):
         found.write("x.tle")
     again = pz.determine(observations(days=(0, 1, 8, 20, 40), noise=5e-7), stations=[SITE], forces="none", guess=facts)
     assert_allclose(again.orbit.at(found.epoch), found.orbit.at(), rtol=1e-6)
+
+
+DECEMBER = pz.Epoch("1801-12-31T04:48:00 UT1")
+
+
+@pytest.mark.parametrize(("who", "arcseconds"), [(0, 40.0), (1, 1.0)])
+def test_published_orbits_are_read_as_they_were_meant(data_dir, who, arcseconds):
+    """Gauss's elements of 1802 lie within 40 arcseconds of JPL's path seen from the Sun; today's osculating ones on it."""
+    truth = jpl(data_dir)
+    one = split(["ceres-1801"])[1].published[who]
+    for date in ("1801-01-02T00:00:00 TT", "1801-02-11T00:00:00 TT"):
+        epoch = pz.Epoch(date)
+        there = truth(epoch)
+        off = np.linalg.norm(one.state(epoch, "sun")[:3] - there[:3]) / np.linalg.norm(there[:3])
+        assert np.degrees(off) * 3600 < arcseconds
+
+
+def test_a_published_orbit_that_lacks_something_is_refused(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text((CASES / "ceres-1801.toml").read_text().replace("e = 0.0804785\n", ""))
+    with pytest.raises(ValueError, match=r"published\[0\]: a published orbit has name, date"):
+        split([str(path)])
+
+
+def test_a_file_goes_before_a_case_of_that_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert len(split(["ceres-1801"])[0]) == 1 and split(["ceres-1801"])[1].about == "sun"
+    (tmp_path / "ceres-1801").write_text("")
+    assert split(["ceres-1801"])[0] == ["ceres-1801"]
+
+
+@pytest.mark.slow
+def test_ceres_is_found_again(data_dir):
+    """From Piazzi's nights alone: JPL's orbit within 2.5 sigma, the place of 31 December within a degree and the ellipse."""
+    found = pz.determine("ceres-1801")
+    assert found.determined
+    truth = jpl(data_dir)
+    assert [one["name"] for one in found.to_dict()["published"]] == ["Gauss", "JPL"]
+    off = found.orbit.at() - truth(found.epoch)
+    assert np.abs(off / np.sqrt(np.diag(found.orbit.covariance()))).max() < 2.5
+    place = sight(found.orbit, DECEMBER)
+
+    def at(epoch):
+        return truth(epoch)[:3] - earth.body("earth", DECEMBER, "sun")[0]
+
+    tau = 0.0
+    for _ in range(4):
+        u = at(DECEMBER + -tau)
+        tau = np.linalg.norm(u) / LIGHT
+    true = np.arctan2(u[1], u[0]) % (2 * np.pi), np.arcsin(u[2] / np.linalg.norm(u))
+    assert np.degrees(np.linalg.norm(place.off(*true))) < 1.0
+    assert place.chi_square(*true) < 5.99
+    assert "Gauss" in str(found) and "1802-09-14" in str(found)

@@ -5,10 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from piazzi.determination import case_values as read
 from piazzi.text import nearest, one_line
+
+if TYPE_CHECKING:
+    from piazzi.determination.published import Published
 
 # What files leave open, by the names that `read_tracking` takes; `cli.conventions` has their lines of help
 ANSWERS = (
@@ -137,6 +140,7 @@ class Case:
     covariance_step: float | None = keyed("product", "covariance_step", read.duration)
     interpolation: tuple[str, int] | None = keyed("product", "interpolation", read.interpolation)
     answers: Mapping[str, Any] = field(default_factory=dict)  # by the names of ANSWERS
+    published: tuple[Published, ...] = ()  # orbits of others, which a result stands beside
 
     @classmethod
     def of(cls, words: Mapping[str, Any], where: str = "{}") -> Case:

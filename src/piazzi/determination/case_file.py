@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from piazzi.text import nearest, one_line
 SECTIONS = ("determine", "object", "product")
 ENDING = ".toml"
 LONGEST_PATH = 200
+CASES = Path(__file__).parent / "cases"
 
 
 def split(given: Sequence[Any]) -> tuple[list[Any], Case]:
@@ -25,12 +27,25 @@ def split(given: Sequence[Any]) -> tuple[list[Any], Case]:
     ValueError
         For what is wrong with it, with its place, and for two of them.
     """
+    given = [part for one in given for part in shipped(one)]
     cases = [one for one in given if isinstance(one, str | os.PathLike) and os.fspath(one).lower().endswith(ENDING)]
     if not cases:
         return list(given), Case()
     if len(cases) > 1:
         raise ValueError(f"{os.fspath(cases[0])} and {os.fspath(cases[1])} are both cases: give one")
     return [one for one in given if one is not cases[0]], read_case(cases[0])
+
+
+def shipped(given: Any) -> list[Any]:
+    """The files of a case of the package, by its name where no file is called so; else what was given."""
+    if not isinstance(given, str) or given not in names() or os.path.exists(given):
+        return [given]
+    return [str(CASES / f"{given}.toml"), str(CASES / f"{given}.txt")]
+
+
+def names() -> list[str]:
+    """Names of the cases of the package, each with its tracking."""
+    return sorted(path.stem for path in CASES.glob("*.txt"))
 
 
 def read_case(path: str | os.PathLike[str]) -> Case:
@@ -66,7 +81,14 @@ def _told(tables: Mapping[str, Any], folder: Path) -> Case:
                 case = case.told({name: _beside(name, value, folder)}, f"{section}.{key}")
             except TypeError:
                 raise ValueError(f"{section}.{key} is {one_line(repr(value), 60)}, which it cannot be") from None
-    return case
+    printed = tables.get("published", [])
+    if not printed:
+        return case
+    from piazzi.determination.published import published_of
+
+    if not isinstance(printed, list):
+        raise ValueError("published: must be a list of tables, [[published]]")
+    return replace(case, published=tuple(published_of(one, f"published[{i}]") for i, one in enumerate(printed)))
 
 
 def keys(section: str) -> dict[str, str]:

@@ -9,6 +9,7 @@ import numpy as np
 from piazzi.determination import holding
 from piazzi.determination.guesses import SCHEMA
 from piazzi.determination.orbit import definite_root, jacobian
+from piazzi.determination.published import beside
 from piazzi.determination.residuals import groups, rejected
 from piazzi.evaluate.quantities import finite
 from piazzi.orbit import transform_root
@@ -48,6 +49,7 @@ def document(found: Any) -> dict[str, Any]:
         "modes": list(found.modes) if known else [],
         "held": None if found.held is None else holding.to_dict(found.setup, found.held, found.scale),
         "verdict": {key: sentence.to_dict() for key, sentence in found.verdict.items()},
+        "published": [beside(found.orbit, one) for one in found.case.published] if known else [],
         "forces": dict(found.setup.chosen.facts),
         "left_out": {**found.setup.chosen.left_out, **found.setup.measured.left_out},
         "assumed": list(found.setup.assumed),

@@ -53,6 +53,7 @@ def grids(found: Any, facts: dict[str, Any]) -> list[Grid]:
     return [
         *tables,
         *([_rejected(facts)] if facts["rejected"] else []),
+        *([_published(facts)] if facts["published"] else []),
         *([_estimators(found)] if len(found.estimates) > 1 else []),
     ]
 
@@ -102,6 +103,19 @@ def _rejected(facts: dict[str, Any]) -> Grid:
     return Grid(
         f"Not used: {many} measurements{more}", ("time", "station", "component", "residual\n[sigma]", "why"), tuple(rows), 3
     )
+
+
+def _published(facts: dict[str, Any]) -> Grid:
+    rows = []
+    for one in facts["published"]:
+        worst = max(abs(value) for value in one["in_sigma"])
+        show = display_of("m", [one["distance"]])
+        rows.append((
+            one["name"], one["date"], number(one["distance"] * show.factor, 3), show.unit, number(worst, 3),
+            number(one["chi_square"], 3), one["source"],
+        ))  # fmt: skip
+    columns = ("", "date", "distance", "unit", "worst\n[sigma]", "chi-square\nof 6", "source")
+    return Grid("Published orbits, and how far the answer is from them", columns, tuple(rows), 2)
 
 
 def _estimators(found: Any) -> Grid:
