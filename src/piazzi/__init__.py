@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
     from piazzi.determination.determining import determine
     from piazzi.determination.ephemerides import ephemeris
-    from piazzi.determination.initial import InitialOrbits, initial_orbits
+    from piazzi.determination.initial import initial_orbits
+    from piazzi.determination.initial_result import InitialOrbits
     from piazzi.determination.result import Determination
     from piazzi.determination.unknowns import Estimated
     from piazzi.earth import Epoch
@@ -128,7 +129,8 @@ _WHERE = {
         "piazzi.present.report": "write_report",
         "piazzi.determination.determining": "determine",
         "piazzi.determination.ephemerides": "ephemeris",
-        "piazzi.determination.initial": "InitialOrbits initial_orbits",
+        "piazzi.determination.initial": "initial_orbits",
+        "piazzi.determination.initial_result": "InitialOrbits",
         "piazzi.determination.result": "Determination",
         "piazzi.determination.unknowns": "Estimated",
         "": "earth formats orbit scenarios",

@@ -11,7 +11,7 @@ from piazzi.cli.options import Group
 from piazzi.text import nearest
 
 GROUPS = {
-    "Orbits from tracking": ("determine", "tracking", "propagate", "ephemeris", "difference"),
+    "Orbits from tracking": ("determine", "tracking", "propagate", "ephemeris", "difference", "orbits"),
     "Estimators side by side": ("compare", "estimate", "study", "windows", "observability", "report"),
     "Scenarios and data": ("demo", "scenarios", "simulate", "data"),
 }
@@ -56,6 +56,7 @@ def piazzi() -> None:
       piazzi demo -o demo                       a first look: tables and pictures
       piazzi tracking pass.tdm                  what is in a file of tracking data
       piazzi determine fixes.oem -o orbit.oem   an orbit from files of others
+      piazzi orbits pass.tdm                    every orbit that a tracking allows
       piazzi estimate tracking.npz              the orbit, and how sure it is
       piazzi compare b612-range --with ekf --with graph
       piazzi windows tracking.npz               how long a window has to be

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from piazzi.determination.case import Case
+    from piazzi.determination.initial_result import UndeterminedError
     from piazzi.determination.result import Determination
 
 
@@ -56,6 +57,7 @@ def command(files: tuple[str, ...], **given: Any) -> int:
         read_ephemeris(case.against)  # what is wrong with it is said before the work
     from piazzi.determination.case_text import write_case
     from piazzi.determination.determining import objects_in
+    from piazzi.determination.initial_result import UndeterminedError
 
     status = DONE
     for one in objects_in(files, case) if case.each else [case.object]:
@@ -63,7 +65,12 @@ def command(files: tuple[str, ...], **given: Any) -> int:
         if own.show:
             _show(files, own)
             continue
-        result = _one(files, own)
+        try:
+            result = _one(files, own)
+        except UndeterminedError as error:
+            status = NOT_ESTIMATED
+            _print_ridge(error, case.json)
+            continue
         wrote = _write(result, own)
         if own.save is not None:
             write_case(own.save, own, result.setup)
@@ -71,6 +78,14 @@ def command(files: tuple[str, ...], **given: Any) -> int:
         status = max(status, _status(result, case.strict))
         _print(result, case, wrote)
     return status
+
+
+def _print_ridge(error: UndeterminedError, as_json: bool) -> None:
+    """What is known of an orbit that cannot be determined."""
+    if as_json:
+        output.print_json(error.orbits.to_dict())
+    else:
+        output.print_text(f"not determined: {error}")
 
 
 def _show(files: Sequence[str], case: Case) -> None:

@@ -10,7 +10,7 @@ from piazzi.cli import options, output
 from piazzi.cli.running import DONE, NOT_ESTIMATED
 
 if TYPE_CHECKING:
-    from piazzi.cli.orbits import Course
+    from piazzi.cli.courses import Course
 
 ENDINGS = (".oem", ".nc", ".csv")
 
@@ -49,7 +49,7 @@ def command(
       piazzi propagate state.opm --forces "degree=40 tides=none" --json
     """
     output.check_output(output_file, ENDINGS)
-    from piazzi.cli.orbits import course_of, span_of
+    from piazzi.cli.courses import course_of, span_of
     from piazzi.earth.rotation import frame_named
 
     frame_named(frame)

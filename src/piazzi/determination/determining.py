@@ -6,6 +6,7 @@ import os
 import re
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,13 +23,15 @@ from piazzi.determination.editing import edited
 from piazzi.determination.fit import begun, estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
 from piazzi.determination.holding import Held, held, unasked
+from piazzi.determination.initial import initial_orbits
+from piazzi.determination.initial_result import InitialOrbits
 from piazzi.determination.instruments import with_instruments
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
 from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.determination.setup import Setup, posed, setup
 from piazzi.determination.sun_forces import forces_about_the_sun
-from piazzi.determination.unguided import goes_about_the_sun, unguided
+from piazzi.determination.unguided import first_look, goes_about_the_sun, unguided
 from piazzi.determination.unknowns import BIAS, CLOCK, SCALE, asked
 from piazzi.determination.verdict import verdict
 from piazzi.earth import Epoch
@@ -133,6 +136,21 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
     files, told = split(tracking)
     case = told.told(words) if case is None else case
     _, at = _instant(case.epoch)
+    seen, chosen, begin, earlier = _read(files, case)
+    begin = begin or unguided(seen, lambda first: posed(seen, chosen(first), first))
+    return setup(seen, chosen(begin), begin, at=at, earlier=earlier)
+
+
+def fitting_orbits(*tracking: Any, case: Case | None = None, **words: Any) -> InitialOrbits:
+    """All orbits that fit a tracking, of the same words as `determine`, whose guess is not asked for."""
+    files, told = split(tracking)
+    case = told.told(words) if case is None else case
+    seen, chosen, _, _ = _read(files, replace(case, guess=None, prior=None))
+    return initial_orbits(posed(seen, chosen(first := first_look(seen)), first), seen.tracking)
+
+
+def _read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[[Guess], Chosen], Guess | None, Earlier | None]:
+    """What was measured, the forces on an orbit, where to begin where somebody says it, and the orbit of before."""
     wanted, burns = asked(case.estimate, case.consider), burns_of(case.manoeuvre)
     rows = of_object(_observations(files, case.answers), case.object)
     rows, earlier = _beside_prior(rows, case)
@@ -146,8 +164,7 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
             found = chosen_forces(case.forces, orbit.state, name=seen.object, mass=case.mass, area=case.area)
         return with_unknowns(found, wanted, burns, seen)
 
-    begin = begin or unguided(seen, lambda first: posed(seen, chosen(first), first))
-    return setup(seen, chosen(begin), begin, at=at, earlier=earlier)
+    return seen, chosen, begin, earlier
 
 
 def _beside_prior(rows: Observations, case: Case) -> tuple[Observations, Earlier | None]:

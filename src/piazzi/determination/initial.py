@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from piazzi.determination.centres import Centre, centre_of
+from piazzi.determination.initial_result import InitialOrbits, OrbitMode, Parting
+from piazzi.determination.ridge import OPEN, openness, ridge
 from piazzi.determination.sights import observers, rows_of
 from piazzi.earth import Epoch
 from piazzi.estimate.batch import BatchLeastSquares, undisturbed
@@ -27,72 +29,6 @@ MOST = 6  # two-body orbits that are refined
 WIDE = 0.3  # of distance and speed: the sigma of where a fit begins
 
 
-@dataclass(frozen=True, eq=False)
-class OrbitMode:
-    """One orbit that fits.
-
-    Attributes
-    ----------
-    epoch : the first row that was used
-    mean : (6,) m, m/s, on the axes of the problem
-    covariance : (6, 6)
-    probability : among all that fit, by Laplace's approximation of the evidence, before the full model if none of it ended
-    weighted_rms : of the residuals in their sigmas
-    rows : how many it was fitted to
-    """
-
-    epoch: Epoch
-    mean: Array
-    covariance: Array
-    probability: float
-    weighted_rms: float
-    rows: int
-
-
-@dataclass(frozen=True)
-class Parting:
-    """Where two orbits are farthest apart soon after the last row: an instant, the station that sees it, m, and rad there."""
-
-    epoch: Epoch
-    station: str
-    distance: float
-    angle: float
-
-    def __str__(self) -> str:
-        degrees = np.degrees(self.angle)
-        return f"{self.distance / 1e3:,.1f} km, {degrees:.3g} deg on the sky of {self.station}, on {self.epoch}"
-
-
-@dataclass(frozen=True, eq=False)
-class InitialOrbits:
-    """Orbits that fit, the most probable first.
-
-    Attributes
-    ----------
-    modes : the orbits
-    starts, fits : of two-body motion, from how many starts, and how many ended
-    apart : where the first two part next; None where there is one
-    about : what they go about, "earth" or "sun"
-    """
-
-    modes: tuple[OrbitMode, ...]
-    starts: int
-    fits: int
-    apart: Parting | None = None
-    about: str = "earth"
-
-    def __str__(self) -> str:
-        many = "1 orbit fits" if len(self.modes) == 1 else f"{len(self.modes)} orbits fit"
-        lines = [f"{many} about the {self.about.title()} ({self.fits} fits from {self.starts} starts)"]
-        for mode in self.modes:
-            r, v = np.linalg.norm(mode.mean[:3]) / 1e3, np.linalg.norm(mode.mean[3:])
-            where = f"{r:,.1f} km from the centre at {v:,.1f} m/s on {mode.epoch}"
-            lines.append(f"  probability {mode.probability:.3f}: {where}, weighted RMS {mode.weighted_rms:.2f} of {mode.rows}")
-        if self.apart is not None:
-            lines.append(f"The first two part by {self.apart}")
-        return "\n".join(lines)
-
-
 def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None = None) -> InitialOrbits:
     """All orbits that fit a tracking, from any mix of sensors, without a guess.
 
@@ -106,6 +42,8 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None =
     tracking : rows of positions, distances, their rates, or directions
     region : which orbits are admissible; default bound ones above the surface, out to a million km or 60 astronomical units
 
+    Where the rows leave a ridge of orbits, there are no modes and `ridge` says what they do determine.
+
     Raises
     ------
     ValueError
@@ -118,9 +56,13 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None =
     rows, index = rows_of(problem, tracking)
     first = first_stretch(rows, centre.stretch)
     search = two_body_modes(rows.of(first), region)
-    if not search.modes:
+    if not search.modes and len(np.unique(rows.t)) > 2:
         raise ValueError(f"no orbit fits the {len(np.unique(index[first]))} rows of the first stretch ({search.starts} starts)")
     inside = [m for m in search.modes if m.admissible] or list(search.modes)
+    wide, known = openness(inside[0]) if inside else (np.inf, 0)
+    if wide > OPEN and len(first) == len(rows):
+        found = ridge(rows, region, problem.epoch, known)
+        return InitialOrbits((), search.starts, search.fits, None, centre.name, found)
     begin = float(rows.t[first].min())
     refined = [*_refined(problem, tracking, search, inside[:MOST], begin, float(rows.t[first].max()), region)]
     modes = _weighed(refined) or tuple(_unrefined(problem, search, inside[:MOST], len(np.unique(index[first]))))

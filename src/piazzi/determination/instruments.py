@@ -76,7 +76,7 @@ def passes(seen: Measured) -> tuple[list[int], dict[tuple[str, int], str]]:
         label = seen.labels[seen.tracking.row_stations[own[0]]]
         number[own] = k = count[label] = count.get(label, 0) + 1
         ends = seen.tracking.row_times[own[[0, -1]]].tolist()
-        first, last = ((seen.epoch + x).to("UTC")[:16].replace("T", " ") for x in ends)
+        first, last = (str(seen.epoch + x)[:16].replace("T", " ") for x in ends)
         said[label, k] = f"{first} to {last[11:] if last[:10] == first[:10] else last}"
     of_station = [int(number[seen.tracking.row_stations == s.name].max(initial=0)) for s in seen.stations]
     return of_station, said

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from piazzi.determination.orbit import Orbit
 from piazzi.earth import Epoch, Place, Station
 from piazzi.earth.constants import SPEED_OF_LIGHT
+from piazzi.orbit import propagate_kepler
 from piazzi.problem.checks import Array
 
 ROUNDS = 4  # of light time, each a ten thousandth of the one before
@@ -50,20 +51,35 @@ class Sight:
 def sight(orbit: Orbit, epoch: Any, station: Station | None = None) -> Sight:
     """The place of an orbit about the Sun, at a date of reception, from a station or from the centre of the Earth.
 
-    The covariance is that of where it was when the light left it.
+    The covariance is that of sigma points of the orbit where it stands (Julier and Uhlmann 2004, Proceedings of the IEEE 92,
+    401), which a path that bends over a wide ellipse is in; what two bodies do to them is added to the orbit itself.
     """
-    when = Epoch(epoch)
+    when, own = Epoch(epoch), orbit.to(orbit.centre.frame)
     here = Place(station, when, about="sun").at([when])[0]
-    own, delay = orbit.to(orbit.centre.frame), 0.0
+    delay = 0.0
     for _ in range(ROUNDS):
         line = own.at(when + -delay)[:3] - here
         delay = float(np.linalg.norm(line)) / SPEED_OF_LIGHT
     distance = float(np.linalg.norm(line))
     right_ascension = float(np.arctan2(line[1], line[0])) % (2 * np.pi)
     declination = float(np.arcsin(line[2] / distance))
-    _, east, north = _axes(right_ascension, declination)
-    across = np.stack([east, north]) @ own.root(when + -delay)[:3] / distance
-    return Sight(when, right_ascension, declination, distance, across @ across.T)
+    centre = Sight(when, right_ascension, declination, distance, np.zeros((2, 2)))
+    spread = _spread(own, (when - orbit.epoch) - delay)
+    off = np.array([centre.off(*_angles(line + one)) for one in spread])
+    return replace(centre, covariance=off.T @ off / len(off))
+
+
+def _spread(own: Orbit, dt: float) -> Array:
+    """By how much (12, 3) sigma points are off the orbit a time after its epoch."""
+    mean, root = own.at(), own.root() * np.sqrt(6.0)
+    points = mean + np.vstack([root.T, -root.T])
+    mu = own.centre.mu
+    there = propagate_kepler(points[:, :3], points[:, 3:], mu, dt)[0]
+    return np.asarray(there - propagate_kepler(mean[:3], mean[3:], mu, dt)[0])
+
+
+def _angles(line: Array) -> tuple[float, float]:
+    return float(np.arctan2(line[1], line[0])), float(np.arcsin(line[2] / np.linalg.norm(line)))
 
 
 def _axes(right_ascension: float, declination: float) -> tuple[Array, Array, Array]:

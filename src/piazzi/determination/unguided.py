@@ -9,7 +9,8 @@ import numpy as np
 
 from piazzi.determination.centres import EARTH, SUN, Centre
 from piazzi.determination.guesses import Guess
-from piazzi.determination.initial import InitialOrbits, first_stretch, initial_orbits
+from piazzi.determination.initial import first_stretch, initial_orbits
+from piazzi.determination.initial_result import InitialOrbits, UndeterminedError
 from piazzi.determination.sensing import Measured
 from piazzi.determination.sights import plain_rows
 from piazzi.earth import body
@@ -34,16 +35,24 @@ def first_look(seen: Measured) -> Guess:
         Where no row says where the body is, or nothing fits.
     """
     if seen.about == "sun":  # whose forces do not depend on the orbit
-        start = np.array([2.5 * ASTRONOMICAL_UNIT, 0.0, 0.0]), np.array([0.0, np.sqrt(SUN.mu / (2.5 * ASTRONOMICAL_UNIT)), 0.0])
-        return Guess(seen.epoch, *start, "initial orbits", about="sun")
+        return _nominal(seen)
     rows = _plain(seen)
     kept = first_stretch(rows, EARTH.stretch)
     coarse = replace(rows, sigma=np.where(rows.kind[:, None] == DIRECTION, np.hypot(rows.sigma, AIR), rows.sigma))
     search = two_body_modes(coarse.of(kept), EARTH.region, motion=MOTION)
+    if not search.modes and len(np.unique(rows.t)) < 3:  # anything will do: what they determine is found out later
+        return _nominal(seen)
     if not search.modes:
         raise ValueError(_nothing(len(kept)))
     best = search.modes[0].state
     return Guess(seen.epoch + search.epoch, best[:3], best[3:], "initial orbits")
+
+
+def _nominal(seen: Measured) -> Guess:
+    """Some circular orbit."""
+    r = 2.5 * ASTRONOMICAL_UNIT if seen.about == "sun" else 8e6
+    v = float(np.sqrt(seen.centre.mu / r))
+    return Guess(seen.epoch, np.array([r, 0.0, 0.0]), np.array([0.0, v, 0.0]), "initial orbits", about=seen.about)
 
 
 def _plain(seen: Measured) -> Rows:
@@ -85,8 +94,16 @@ def _slow(rows: Rows) -> bool:
 
 
 def unguided(seen: Measured, pose: Callable[[Guess], Problem]) -> Guess:
-    """The most probable of all orbits that fit, by the problem that `pose` makes of a first one; it knows the others."""
+    """The most probable of all orbits that fit, by the problem that `pose` makes of a first one; it knows the others.
+
+    Raises
+    ------
+    UndeterminedError
+        Where they are a ridge.
+    """
     found: InitialOrbits = initial_orbits(pose(first_look(seen)), seen.tracking)
+    if found.ridge is not None:
+        raise UndeterminedError(found)
     best = found.modes[0]
     words = "the only orbit that fits" if len(found.modes) == 1 else f"the most probable of {len(found.modes)} orbits that fit"
     told = f"{words}, of {found.starts} starts"

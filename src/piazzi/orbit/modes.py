@@ -133,8 +133,8 @@ def _weighed(found: Fits, region: Region, offset_sigma: float) -> tuple[Mode, ..
     if not kept:
         return ()
     used = slice(7 if offset_sigma > 0 else 6)
-    with np.errstate(divide="ignore"):
-        volume = np.array([np.log(np.abs(np.diag(found.root[k])[used])).sum() for k in kept])
+    least = 1e-300  # of rows that leave a direction open, where the evidence has no bound
+    volume = np.array([np.log(np.maximum(np.abs(np.diag(found.root[k])[used]), least)).sum() for k in kept])
     score = -0.5 * found.square[kept] - volume
     inside = region.holds(found.state[kept])
     top = score[inside].max() if inside.any() else score.max()

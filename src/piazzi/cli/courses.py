@@ -1,0 +1,163 @@
+"""ORBIT of the command line -> a problem without measurements, and the times to propagate it to."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import click
+import numpy as np
+
+from piazzi.problem import Gaussian, Problem
+from piazzi.problem.checks import Array
+
+STATES = ("x", "y", "z", "vx", "vy", "vz")
+STEP, SPAN = 60.0, 86400.0
+MOST = 10**7  # states
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """An orbit and what moves it.
+
+    `is_orbit`: its states are those of an orbit about the Earth in the GCRF; `uncertain`: it has a covariance.
+    """
+
+    name: str
+    problem: Problem
+    source: str
+    forces: str
+    assumed: tuple[str, ...]
+    is_orbit: bool
+    uncertain: bool
+    times: Array | None = None
+
+    def ephemeris(self, found: Any, frame: str) -> Any:
+        """The propagated states as an ephemeris; raises ValueError for a scenario that is no orbit with dates."""
+        from piazzi.orbit.predicted import ephemeris_of
+
+        if not self.is_orbit or self.problem.epoch is None:
+            raise ValueError(
+                "an OEM holds orbits: states x, y, z, vx, vy, vz with dates; this scenario has others, write .csv or .nc"
+            )
+        x = [found.names.index(name) for name in STATES]
+        t, first = np.unique(found.times, return_index=True)
+        P = found.covariance[first][:, x][:, :, x] if self.uncertain else None
+        return ephemeris_of(self.name, self.problem.epoch, t, found.mean[first][:, x], P, frame)
+
+
+def course_of(text: str, forces: str | None, begin: str | None, chosen: str | None) -> Course:
+    """The orbit of a file or a scenario.
+
+    Raises
+    ------
+    ValueError
+        For what is no orbit, or forces that are not known.
+    OSError
+        Where a file cannot be read.
+    """
+    from piazzi.scenarios import names
+
+    if not text:
+        raise click.UsageError("ORBIT is empty", click.get_current_context(silent=True))
+    if text.lower().endswith(".toml") or (text in names() and not os.path.exists(text)):
+        return _of_scenario(text, forces)
+    from piazzi.earth.defaults import default_forces, lowest_height, read_forces
+    from piazzi.earth.stepping import longest_step
+    from piazzi.kernels import RungeKutta8
+    from piazzi.orbit.starting import start_of
+
+    start = start_of(text, None if begin is None else _date(begin, "--from"), chosen)
+    height = lowest_height(start.state[:3], start.state[3:])
+    choice = default_forces(height) if forces is None else read_forces(forces, height)
+    P = np.zeros((6, 6)) if start.covariance is None else start.covariance
+    problem = Problem(
+        choice.forces.model(),
+        Gaussian(start.state, P),
+        parameters=choice.values,
+        integrator=RungeKutta8(max_step=longest_step(start.state[:3], start.state[3:])),
+        prior_time=0.0,
+        name=start.name,
+        epoch=start.epoch,
+        functions=choice.functions(start.epoch, choice.air(start.epoch, start.state)),
+    )
+    return Course(start.name, problem, start.source, str(choice), choice.assumed, True, start.covariance is not None)
+
+
+def _of_scenario(text: str, forces: str | None) -> Course:
+    from piazzi.scenarios import load_scenario
+
+    if forces is not None:
+        raise click.UsageError(
+            "--forces is for files of orbits; a scenario has its own", click.get_current_context(silent=True)
+        )
+    scenario = load_scenario(text)
+    problem = scenario.problem
+    is_orbit = {*STATES} <= {*problem.model.states} and {"field", "fixed", "free"} <= {*problem.functions}
+    uncertain = bool(problem.covariance.any())
+    return Course(
+        scenario.name, problem, f"the prior of {text}", "those of the scenario", (), is_orbit, uncertain, scenario.times
+    )
+
+
+def span_of(course: Course, begin: str | None, end: str | None, step: str | None) -> Array:
+    """Times (K,) to propagate to, s past the problem's epoch; those of a scenario where nothing is asked for.
+
+    Raises
+    ------
+    ValueError
+        For dates and times that cannot be read, or too many states.
+    """
+    problem, given = course.problem, course.times
+    if given is not None and begin is end is step is None:
+        return given
+    own = float(given[0]) if given is not None else 0.0
+    first = own if begin is None else _time(problem, begin, "--from", own)
+    usual = SPAN if given is None else float(given[-1] - given[0])
+    last = first + usual if end is None else _time(problem, end, "--to", first)
+    first, last = min(first, last), max(first, last)
+    every = STEP if step is None else _duration(step, "--step")
+    if every <= 0:
+        raise ValueError(f"--step is {every:g} s; it must be positive")
+    count = int(np.floor((last - first) / every * (1 + 1e-12))) + 1
+    if count > MOST:
+        raise ValueError(f"--to and --step make {count:g} states; at most {MOST:g} are allowed")
+    times = first + every * np.arange(count)
+    return times if last - times[-1] < 1e-6 else np.append(times, last)
+
+
+def _time(problem: Problem, text: str, what: str, since: float) -> float:
+    """Seconds past the epoch of a date, or of a time after `since`."""
+    plain = text.strip().removeprefix("+")
+    try:
+        return since + _duration(plain, what)
+    except ValueError:
+        if problem.epoch is None:
+            raise
+    return float(_date(text, what) - problem.epoch)
+
+
+def _date(text: str, what: str) -> Any:
+    from piazzi.earth import Epoch
+
+    try:
+        return Epoch(text)
+    except ValueError as error:
+        raise ValueError(f"{what}: {error}") from None
+
+
+def _duration(text: str, what: str) -> float:
+    """Seconds, plain or with a unit."""
+    from piazzi.earth.station_files import quantity
+
+    try:
+        seconds = float(text)
+    except ValueError:
+        try:
+            seconds = quantity(text, "s", what)
+        except ValueError:
+            seconds = np.nan
+    if not np.isfinite(seconds):
+        raise ValueError(f"{what} is {text[:60]!r}; it must be a time such as 600, '10 min', '36 h' or '3 day'")
+    return seconds
