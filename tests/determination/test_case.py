@@ -19,7 +19,7 @@ def test_the_call_and_the_command_take_what_the_table_has():
     made = {p.name for p in command.params if isinstance(p, click.Option)} - {"help_all"}
     of_command = {name for name, option in OPTIONS.items() if option.flags is not None}
     assert made == {*of_command, *(name.replace("-", "_") for name, *_ in _OPTIONS)}
-    assert {f.name for f in fields(Case)} == {*OPTIONS, "answers"}
+    assert {f.name for f in fields(Case)} == {*OPTIONS, "answers", "published"}
 
 
 def test_every_convention_is_an_answer():
