@@ -117,6 +117,7 @@ def test_unknown_scenarios_are_refused(call):
     assert "nowhere.toml" in call("scenarios", "check", "nowhere.toml").refused()
 
 
+@pytest.mark.slow  # a dozen kernels
 def test_demo_writes_what_it_says(call, tmp_path):
     result = call("demo", "-o", tmp_path / "demo")
     assert result.status == 0

@@ -39,7 +39,7 @@ def spherical(n):
     return np.array([np.arctan2(n[1], n[0]), np.arctan2(n[2], np.hypot(n[0], n[1]))])
 
 
-@pytest.mark.parametrize("tag", ["reception", "bounce", "transmission"])
+@pytest.mark.parametrize("tag", ["reception", "bounce", pytest.param("transmission", marks=pytest.mark.slow)])
 def test_azimuth_and_elevation_are_those_of_the_line_along_the_light(tag):
     p = problem(sensors.azimuth_elevation("geocentric", tag=tag), sensors.azimuth_elevation(name="seen", tag=tag))
     for kind in KINDS if tag == "reception" else ("GEO",):

@@ -27,7 +27,7 @@ def rates(p, path, tag, x, far=YARRAGADEE, h=0.5):
     return (8 * (at[1] - at[-1]) - (at[2] - at[-2])) / (12 * h)
 
 
-@pytest.mark.parametrize("tag", ["reception", "bounce", "transmission"])
+@pytest.mark.parametrize("tag", ["reception", "bounce", pytest.param("transmission", marks=pytest.mark.slow)])
 def test_rate_at_an_instant_is_the_derivative_of_the_range(tag):
     given = [sensors.range_rate(path, name=path, tag=tag) for path in ("one-way", "two-way")]
     given.append(sensors.range_rate("three-way", name="three-way", tag=tag, transmitter=HERSTMONCEUX))
@@ -53,6 +53,7 @@ def test_rate_over_a_count_is_a_difference_of_ranges(count):
         np.testing.assert_allclose(H, slopes(lambda y: p.measure("range_rate", y, T), x), atol=2e-8)
 
 
+@pytest.mark.slow  # uncompiled
 def test_air_in_a_count_is_the_difference_of_delays_and_the_ionosphere_advances():
     numbers = {"count": 60.0}
     layer = {"electrons": 3e17, "frequency": 2.2e9, "uplink_frequency": 2.0e9}
