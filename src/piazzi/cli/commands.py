@@ -49,24 +49,25 @@ class Commands(Group):
 def piazzi() -> None:
     """Orbits from tracking data: several estimators side by side, and which of them to trust.
 
-    SOURCE is a recording (.npz, .nc, or .csv with --scenario), the name of a built-in scenario, a scenario file (.toml),
-    or - for standard input.
+    SOURCE is a recording (.npz, .nc, or with --scenario .csv, TDM, SP3, ...), the name of a built-in scenario, a scenario
+    file (.toml), or - for standard input.
 
     Examples:
       piazzi demo -o demo                       a first look: tables and pictures
       piazzi tracking pass.tdm                  what is in a file of tracking data
-      piazzi determine fixes.oem -o orbit.oem   an orbit from files of others
+      piazzi determine fixes.oem -o orbit.oem   an orbit from tracking files
       piazzi orbits pass.tdm                    every orbit that a tracking allows
-      piazzi estimate tracking.npz              the orbit, and how sure it is
+      piazzi estimate tracking.npz              the states and their uncertainty
       piazzi compare b612-range --with ekf --with graph
       piazzi windows tracking.npz               how long a window has to be
       piazzi observability b612-range-q0        what can be seen, and how well
-      piazzi propagate orbit.oem --to "3 day"   where it will be, how sure
-      piazzi ephemeris orbit.oem --from 7090    where and when it is seen
+      piazzi propagate orbit.oem --to "3 day"   predicted states, covariances
+      piazzi ephemeris orbit.oem --from 7090    when and where it is seen
       piazzi difference fit.oem truth.sp3       how far two orbits are apart
       piazzi report tracking.npz -o page.html   a self-contained interactive page
       piazzi scenarios list                     what is built in
       piazzi data                               which data are used, how old
 
-    Exit status: 0 done, 2 bad usage or input, 3 an estimator did not succeed.
+    Exit status: 0 done, 2 bad usage or input, 3 an estimator did not succeed or no
+    orbit was determined.
     """

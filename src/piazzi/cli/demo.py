@@ -25,10 +25,10 @@ KINDS = ("png", "pdf", "svg")
 
 @click.command(cls=options.Command)
 @click.option("-o", "--output", "folder", metavar="DIR", default="demo", show_default=True, help="Folder to write into.")
-@click.option("--format", "kind", type=click.Choice(KINDS), default=KINDS[0], show_default=True, help="Of the pictures.")
+@click.option("--format", "kind", type=click.Choice(KINDS), default=KINDS[0], show_default=True, help="Format of the pictures.")
 @options.seed
 def command(folder: str, kind: str, seed: int) -> int:
-    """Simulate, estimate and draw two problems.
+    """Simulate and estimate two problems, with pictures.
 
     satellite-bearing is a satellite seen only by its bearing; b612-range a probe around a tiny planet seen only by its range.
 

@@ -17,7 +17,7 @@ PICTURES = (".png", ".pdf", ".svg")
     "--axes", metavar="AXES", default="RTN", show_default=True, help="RTN or TNW of A, or a frame such as GCRF or ITRF."
 )
 @click.option("--span", metavar="'FIRST .. LAST'", help="Dates with their scale; either may be left out.")
-@click.option("--step", metavar="SECONDS", type=float, help="Between times.  [default: the rows of A]")
+@click.option("--step", metavar="SECONDS", type=float, help="Time step.  [default: the rows of A]")
 @click.option("--object", "chosen", metavar="NAME", help="Object in files of several, by name or identifier.")
 @click.option("--degree", metavar="N", type=options.WholeNumber(1), help="Of the polynomial between rows.  [default: chosen]")
 @options.output("Draw the difference over time, as .png, .pdf or .svg.")

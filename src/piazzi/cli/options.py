@@ -57,14 +57,14 @@ def recording(function: F) -> F:
         return function(*args, recording=Recording(parse_columns(columns or ""), scale, **words), **rest)
 
     scales = click.Choice(SCALES, case_sensitive=False)
-    said = f"Time scale of dates in CSV input that name none: {', '.join(SCALES)}."
-    text = "Names of the columns of CSV input by ours, such as 'range=RNG[km] week=gps_week sow=gps_tow'."
+    said = f"Time scale of CSV dates that state none: {', '.join(SCALES)}."
+    text = "Columns of CSV input by their names here, such as 'range=RNG[km] week=gps_week sow=gps_tow'."
     command = click.option("--stations", multiple=True, metavar="FILE", help=STATIONS)(command)
-    command = click.option("--sigma", multiple=True, metavar="SIGMA", help="Of tracking: 10m, range=10m; may be repeated.")(
-        command
-    )
-    command = click.option("--object", "chosen", metavar="NAME", help="Object in tracking of several.")(command)
-    command = click.option("--frame", metavar="AXES", help="Of fixes that do not say it: ITRF, EME2000, ...")(command)
+    command = click.option(
+        "--sigma", multiple=True, metavar="SIGMA", help="Sigmas of tracking: 10m, range=10m; may be repeated."
+    )(command)
+    command = click.option("--object", "chosen", metavar="NAME", help="Object to use where tracking has several.")(command)
+    command = click.option("--frame", metavar="AXES", help="Frame of positions that state none: ITRF, EME2000, ...")(command)
     command = click.option("--scale", metavar="SCALE", type=scales, help=said)(command)
     return cast(F, click.option("--columns", metavar="NAMES", help=text)(command))
 

@@ -21,7 +21,7 @@ ENDINGS = (".oem", ".nc", ".csv")
 @click.option("--from", "begin", metavar="DATE", help="Where to begin.  [default: the orbit's own date]")
 @click.option("--to", "end", metavar="DATE", help="Date with its scale, or a time such as '3 day'.  [default: 1 day]")
 @click.option("--step", metavar="TIME", help="Between states: seconds, or such as '10 min'.  [default: 60 s]")
-@click.option("--frame", metavar="FRAME", default="GCRF", show_default=True, help="Of what is written.")
+@click.option("--frame", metavar="FRAME", default="GCRF", show_default=True, help="Frame of the output.")
 @click.option("--object", "chosen", metavar="NAME", help="Object in files of several, by name or identifier.")
 @options.output("Write states and covariances as .oem, .nc or .csv.")
 @options.as_json

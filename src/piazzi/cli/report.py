@@ -51,8 +51,8 @@ def command(
 ) -> int:
     """Compare estimators on each SOURCE and write one page.
 
-    The page works offline, in any browser: a summary in plain words, then charts to point at, an orbit that plays, and all
-    numbers.  It can be printed.
+    The page works offline, in any browser: a summary in plain words, interactive charts, an animated orbit, and all numbers.
+    It can be printed.
 
     Examples:
       piazzi report tracking.npz --windows 10,50,100,200 --observability

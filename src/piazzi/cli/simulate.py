@@ -48,7 +48,7 @@ def command(
     perfect_guess: bool,
     noiseless: bool,
 ) -> int:
-    """Draw a true path and measurements of it.
+    """Simulate a true trajectory and its measurements.
 
     A scenario says what is true and when it is measured.  A recording is simulated anew: its problem, at its times.
 
