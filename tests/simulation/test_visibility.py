@@ -10,6 +10,7 @@ import piazzi as pz
 from piazzi.kernels import KernelSpec
 from piazzi.scenarios import ScenarioError, load_scenario
 from piazzi.scenarios.write import problem_from_tables, problem_to_tables
+from piazzi.simulation.visibility import seen
 from piazzi.study.runs import simulated
 from piazzi.study.tasks import Task
 from tests.references.drawn import same_tracking
@@ -398,3 +399,14 @@ def test_steps_that_are_too_long_for_a_gap_are_told_with_it_and_with_what_helps(
 @pytest.mark.parametrize("integrator", [pz.RungeKutta4(max_step=5.0), pz.RungeKutta4(300), pz.DormandPrince()])
 def test_nothing_is_told_where_steps_suit_the_gap(integrator):
     simulate(watched_once_a_turn(integrator))  # warnings are errors
+
+
+def test_rules_of_the_time_alone_hold_for_many_runs_at_once():
+    """Marks of several truths together are those of each by itself, though one rule is the same for all."""
+    given = problem(visible=["elevation - mask", f"sin({RATE!r}*t)"])
+    angle = RATE * TIMES + np.array([[0.0], [0.3], [2.0]])
+    states = R * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    together = seen(given, TIMES, states)
+    assert together.shape == (3, len(TIMES), 2) and together.any() and not together.all()
+    for one, marks in zip(states, together, strict=True):
+        assert_array_equal(seen(given, TIMES, one), marks)

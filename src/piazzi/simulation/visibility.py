@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 
@@ -43,7 +44,8 @@ def _visible(problem: Problem, station: Station, values: dict[str, Array | float
     functions = {**problem.functions, STATION: station.place}
     wanted = needed(sensor.visible, *layers)
     known = with_arrays({**values, **station.numbers}, wanted, *layers, functions=functions, model=problem.model)
-    return np.logical_and.reduce([np.asarray(evaluate_arrays(text, known)) > 0 for text in sensor.visible])  # type: ignore[no-any-return]
+    above = [np.asarray(evaluate_arrays(text, known)) > 0 for text in sensor.visible]
+    return reduce(np.logical_and, above)  # one by one: a rule of the time alone is not of each run
 
 
 def rules(problem: Problem, stations: Sequence[int]) -> str:
