@@ -188,7 +188,14 @@ def _seen(rows: Observations, case: Case, earlier: Earlier | None, clocks: bool)
     def by(about: str) -> Measured:
         corrections = case.answers.get("corrections")
         return measured(
-            rows, case.stations, com=case.com, corrections=corrections, clocks=clocks, name=case.object, about=about
+            rows,
+            case.stations,
+            com=case.com,
+            corrections=corrections,
+            clocks=clocks,
+            name=case.object,
+            about=about,
+            antenna=case.antenna,
         )
 
     seen = by(case.about or "earth")
@@ -296,7 +303,7 @@ def _guess(given: Any, seen: Measured, chosen: str | None) -> Guess | None:
     """The user's, or what fixes give by themselves; None where there is neither."""
     if given is not None and given != "none":
         return guess_of(given, seen.first, chosen or seen.object or None, seen.about)
-    wide = {s.name for s in seen.stations if s.sensor in ("position", "position_velocity")}
+    wide = {s.name for s in seen.stations if s.sensor.startswith("position")}
     own = np.isin(seen.tracking.row_stations, list(wide)) & np.isfinite(seen.tracking.values[:, :3]).all(axis=1) if wide else []
     return from_fixes(seen.epoch, seen.tracking.row_times[own], seen.tracking.values[own, :3]) if np.any(own) else None
 

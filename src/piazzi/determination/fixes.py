@@ -9,7 +9,7 @@ import numpy as np
 
 from piazzi.determination.parts import Part
 from piazzi.determination.sites import Context
-from piazzi.earth import rotation, transform
+from piazzi.earth import rotation, sensors, transform
 from piazzi.earth.rotation import TURNING, frame_named
 from piazzi.formats import Observations
 from piazzi.model import Sensor
@@ -49,7 +49,7 @@ def fixes(context: Context, index: Array) -> Sequence[Part]:
                 raise ValueError(_broken(observations, int(index[0])))
             if not (observations.t[rows] == observations.t[rows[:, :1]]).all():
                 raise ValueError(_broken(observations, int(index[0])))
-            found.append(_part(observations, rows, sensor))
+            found.append(_part(context, rows, sensor))
     return found
 
 
@@ -58,8 +58,9 @@ def _broken(observations: Observations, row: int) -> str:
     return f"{file}: a fix is x, y and z of one time, and may have vx, vy and vz; there are rows that are less"
 
 
-def _part(observations: Observations, rows: Array, sensor: Sensor) -> Part:
+def _part(context: Context, rows: Array, sensor: Sensor) -> Part:
     """Fixes of (R, 3) or (R, 6) rows in the GCRF."""
+    observations = context.observations
     t, values, sigma = observations.t[rows[:, 0]], observations.value[rows].copy(), observations.sigma[rows]
     noise = np.zeros((len(rows), rows.shape[1], rows.shape[1]))
     place = np.arange(rows.shape[1])
@@ -78,7 +79,12 @@ def _part(observations: Observations, rows: Array, sensor: Sensor) -> Part:
         noise[own] = _turned(noise[own], frame, dates)
         if velocity is not None and frame in TURNING:
             assumed.append("velocities of fixes are relative to the turning axes")
-    return Part(sensor, STATION, t, values, noise, rows, assumed=tuple(assumed))
+    if context.antenna is None:
+        return Part(sensor, STATION, t, values, noise, rows, assumed=tuple(assumed))
+    arm = sensors.position(f"{sensor.name}_of_antenna", velocity=sensor is BOTH, lever=True)
+    stands: dict[str, Any] = dict(zip(("lever_radial", "lever_along", "lever_cross"), context.antenna, strict=True))
+    numbers = arm.at(None, context.epoch, 1.0, name=STATION, **stands)["numbers"]
+    return Part(arm, STATION, t, values, noise, rows, numbers=numbers, assumed=tuple(assumed))
 
 
 def _turned(noise: Array, frame: str, dates: Sequence[Any]) -> Array:

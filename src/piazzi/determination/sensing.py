@@ -87,6 +87,7 @@ def measured(
     clocks: bool = False,
     name: str | None = None,
     about: str = "earth",
+    antenna: tuple[float, float, float] | None = None,
 ) -> Measured:
     """Sensors, stations and tracking of observations of one object.
 
@@ -99,6 +100,7 @@ def measured(
     clocks : whether sensors have a number that times are late by
     name : of the object, where the files do not say it
     about : what the orbit goes about
+    antenna : where fixes are taken, m from the centre of mass along R, T and N
 
     Raises
     ------
@@ -123,7 +125,9 @@ def measured(
     epoch = Epoch.at(float(everything.epoch.whole + np.floor(everything.t[index[0]])))
     known = everything.objects
     own = known[0] if known else name or ""
-    context = Context(everything, epoch, sites, own, com, corrections == "applied", corrections == "open", clocks, about)
+    context = Context(
+        everything, epoch, sites, own, com, corrections == "applied", corrections == "open", clocks, about, antenna
+    )
     parts = _parts(context, index)
     sensors, places, names, labels = _stations(parts)
     times = np.concatenate([part.t for part in parts]) + (everything.epoch - epoch)

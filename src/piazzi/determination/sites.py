@@ -32,6 +32,7 @@ class Context:
     open : whether the user says that they are not
     clocks : whether sensors have a number that times are late by
     about : what the orbit goes about
+    antenna : where fixes are taken, m from the centre of mass along R, T and N, where the user says it
     """
 
     observations: Observations
@@ -43,6 +44,7 @@ class Context:
     open: bool = False
     clocks: bool = False
     about: str = "earth"
+    antenna: tuple[float, float, float] | None = None
     said: dict[str, None] = field(default_factory=dict)
 
     def site(self, index: int) -> Station:
