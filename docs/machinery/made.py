@@ -1,4 +1,4 @@
-"""What the site shows and nobody writes: answers of the command line, and pictures that the tutorials' code makes."""
+"""What the site shows and nobody writes: answers of the command line, pictures that pages' code makes, pages as notebooks."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import click
+import notebooks
 from sphinx.application import Sphinx
 from sphinx.util import logging
 
@@ -54,6 +55,8 @@ def pictures(app: Sphinx) -> None:
             continue
         folder = page.parent / "made"
         folder.mkdir(exist_ok=True)
+        if page.parent.name == "gallery":
+            notebooks.write(page, folder / f"{page.stem}.ipynb")
         command = [sys.executable, "-W", "error", "-c", RUN, str(BLOCKS.parent), str(page), str(folder)]
         running.append((page, subprocess.Popen(command, stderr=subprocess.PIPE, text=True)))
     for page, process in running:

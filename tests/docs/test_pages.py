@@ -1,7 +1,9 @@
 """The documentation's code runs and prints what the pages say; what its sentences say is in there."""
 
 import ast
+import os
 import re
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +18,7 @@ sys.path.insert(0, str(DOCS / "machinery"))
 try:
     import blocks
     import links
+    import notebooks
 finally:
     sys.path.pop(0)
 
@@ -37,6 +40,26 @@ def test_numbers_of_the_prose_are_in_the_code_or_its_results(page):
 
 def test_the_tutorials_and_guides_are_among_them():
     assert {"bearing-only", "range-only", "own-problem", "founding-texts"} <= {p.stem for p in PAGES}
+
+
+def test_a_page_as_a_notebook(tmp_path):
+    page = "# Title\n\nSee [that](../maths.md).\n\n```python\nfigure.savefig('a.svg')\n```\n"
+    page += "\n```text\n1\n```\n\n![Alt](made/a.svg)\n\nEnd\n"
+    page += "\n```console\n$ piazzi data\nlines\n```\n"
+    found = notebooks.notebook(page)
+    cells = [(c["cell_type"], "".join(c["source"])) for c in found["cells"]]
+    assert cells == [("markdown", "# Title\n\nSee that."), ("code", "figure"), ("markdown", "End"), ("code", "!piazzi data")]
+    assert (found["nbformat"], found["nbformat_minor"]) == (4, 5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [pytest.param(p, id=p.stem) for p in sorted((DOCS / "gallery").glob("*.md"))])
+def test_every_notebook_runs_with_nothing_but_the_package(page, tmp_path):
+    cells = notebooks.notebook(page.read_text())["cells"]
+    code = "\n".join("".join(c["source"]) for c in cells if c["cell_type"] == "code")
+    code = re.sub(r"^!(.*)$", lambda m: f"assert __import__('os').system({m[1]!r}) == 0", code, flags=re.MULTILINE)
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    subprocess.run([sys.executable, "-P", "-c", code], cwd=tmp_path, env={**os.environ, "PATH": path}, check=True, timeout=600)
 
 
 def test_a_wrong_result_is_noticed(tmp_path):
