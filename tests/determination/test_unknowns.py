@@ -1,12 +1,16 @@
 """The words of --estimate, --consider and --manoeuvre, and what becomes of them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import piazzi as pz
 from piazzi.determination.burns import Burn, burns_of
+from piazzi.determination.physical import physical
 from piazzi.determination.ramps import RAMP, pieces, profiles
-from piazzi.determination.unknowns import asked, considered, listed
+from piazzi.determination.unknowns import Label, asked, considered, listed
+from piazzi.determination.verdict import Sentence
 from piazzi.outside.function import Function
 
 WHEN = "2026-11-03T04:12:00Z"
@@ -164,6 +168,17 @@ def test_manoeuvres_of_messages(tmp_path):
     assert (first.epoch, first.dv, first.axes, first.duration) == (pz.Epoch(WHEN), (1.0, 0.0, 0.0), "TNW", 60.0)
     assert abs(second.epoch - pz.Epoch(WHEN)) < 1e-9
     assert (second.dv, second.axes, second.duration) == ((0.0, 1.0, 0.0), "RTN", 0.0)
+
+
+def test_a_negative_coefficient_is_a_fault_of_the_model():
+    names = ("x", "cd_a_m_1", "cd_a_m_2", "cd_a_m_change")
+    given = SimpleNamespace(
+        problem=SimpleNamespace(model=SimpleNamespace(names=names)), solution=0, labels={"cd_a_m_2": Label("cd/12h/2", "")}
+    )
+    good = Sentence(True, 1.0, "size", "Honest.")
+    for value, ok in ((0.01, True), (-0.01, False)):
+        found = physical(given, SimpleNamespace(mean=np.array([[-1.0, 0.02, value, -0.3]])), good)
+        assert found.ok is ok and ("cd/12h/2 came out negative" in found.sentence) is not ok
 
 
 def test_values_for_parts_of_the_time_change_over_a_ramp():

@@ -68,7 +68,7 @@ KINDS = {
         "cd/8h=0.5 bias.range/pass=5m", "2024-03-10T11:30:00Z dv=0,0.2,0m/s sigma=0.02m/s",
     ),
     "geo": Kind(
-        orbit(42164e3, 0.0002, 0.1, 250.0), ("WEST", "EAST"), 48.0, 1200.0, 3.0,
+        orbit(42164e3, 0.0002, 0.1, 358.0), ("WEST", "EAST"), 48.0, 1200.0, 3.0,
         "gravity=EGM2008 degree=8 radiation=cannonball cr_a_m=0.02", "cr=0.2 bias.range.WEST=10m",
         "2024-03-10T20:00:00Z dv=0,0.1,0m/s sigma=5% for=900s engine=A\n"
         "2024-03-11T08:00:00Z dv=0,0,1m/s sigma=5% for=1800s engine=A",

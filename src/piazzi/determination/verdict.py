@@ -12,6 +12,7 @@ from piazzi.determination.analysis import Analysis
 from piazzi.determination.common import together
 from piazzi.determination.editing import STATION
 from piazzi.determination.holding import GOOD, Held
+from piazzi.determination.physical import physical
 from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate
@@ -68,7 +69,7 @@ def verdict(
                 seen(given, analysis, keep),
                 alone(given),
                 converged(given, answer, analysis, keep),
-                unseen(honest(given, analysis, keep, reasons), held),
+                physical(given, answer, unseen(honest(given, analysis, keep, reasons), held)),
                 agreed(given, name, estimates),
                 Sentence(None, None, "none yet", "Complete: what the forces leave out is not weighed against sigma yet."),
             ),
