@@ -75,6 +75,7 @@ def look(x):
     return azimuth, elevation
 
 
+@pytest.mark.slow  # uncompiled
 def test_the_air_is_what_its_formulas_say():
     latitude, longitude, height = YARRAGADEE.place(EPOCH)
     weather = earth.Weather(98000.0, 290.0, 0.4)

@@ -48,6 +48,7 @@ def test_noise_that_depends_on_the_states_is_no_reason_to_refuse_a_step():
         assert estimate.message == ""
 
 
+@pytest.mark.slow
 def test_one_range_to_a_walker():
     """Curved valleys, in many of which Gauss and Newton's plain step leads away from the minimum."""
     model = pz.Model(["x", "y", "vx", "vy"], ["vx", "vy", "0", "0"], [pz.Sensor("r", ["hypot(x - 1, y + 2)"])])

@@ -63,7 +63,15 @@ def test_the_process_noise_of_the_gap_counts():
     assert_allclose(moved.prior.covariance, expected, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.Smoother(), pz.FactorGraph(), pz.SquareRootKalmanFilter()])
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        pz.ExtendedKalmanFilter(),
+        pz.FactorGraph(),
+        pytest.param(pz.Smoother(), marks=pytest.mark.slow),
+        pytest.param(pz.SquareRootKalmanFilter(), marks=pytest.mark.slow),
+    ],
+)
 def test_estimates_are_those_of_the_same_problem_with_its_prior_given_at_the_first_measurement(estimator):
     back, seen = rotation(-5.0), tracking()
     given = oscillator(pz.Gaussian(back @ M0, back @ P0 @ back.T), -3.0)
@@ -83,7 +91,9 @@ def test_without_noise_it_is_the_regression_on_the_state_at_the_time_of_the_prio
     assert_allclose(found.mean[20], x, rtol=0, atol=1e-10)  # epoch 20 is at 2 s
 
 
-@pytest.mark.parametrize("integrator", [pz.Kepler(), pz.DormandPrince(), pz.RungeKutta4(max_step=5.0)])
+@pytest.mark.parametrize(
+    "integrator", [pz.Kepler(), pytest.param(pz.DormandPrince(), marks=pytest.mark.slow), pz.RungeKutta4(max_step=5.0)]
+)
 def test_an_orbit_goes_back_by_every_kind_of_integrator(integrator):
     """Back and forward again is where the prior was, by the same integrator; by Kepler, the closed form's state."""
     mu, r, v = 3.986e14, np.array([7e6, 0.0, 0.0]), np.array([100.0, 5.4e3, 5.2e3])

@@ -207,7 +207,16 @@ def noise_of(problem, x, start, end):
     return live.covariance
 
 
-def test_process_noise_is_split_at_the_event():
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        pz.RungeKutta4(3),
+        pytest.param(pz.RungeKutta8(2), marks=pytest.mark.slow),
+        pytest.param(pz.DormandPrince(), marks=pytest.mark.slow),
+    ],
+    ids=lambda i: type(i).__name__,
+)
+def test_process_noise_is_split_at_the_event(integrator):
     """The integral of Phi(T, s) Q Phi(T, s)^T, by Gauss and Legendre on both sides of the crossing, from closed forms."""
     q, x, T = 0.3, np.array([0.1, 0.6]), 3.0
     crossing = (-0.85 + sqrt(0.85**2 + 2 * IDLE * 1.9)) / IDLE
@@ -222,8 +231,7 @@ def test_process_noise_is_split_at_the_event():
             else:
                 Phi = np.array([[1.0, T - s], [0.0, 1.0]])
             total += weight * (b - a) / 2 * np.outer(Phi[:, 1], Phi[:, 1]) * q
-    for integrator in (pz.RungeKutta4(3), pz.RungeKutta8(2), pz.DormandPrince()):
-        assert_allclose(noise_of(cart(integrator, q), x, 0.0, T), total, rtol=1e-8)
+    assert_allclose(noise_of(cart(integrator, q), x, 0.0, T), total, rtol=1e-8)
 
 
 def test_a_shadow():

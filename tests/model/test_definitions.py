@@ -50,7 +50,14 @@ def problem(model: pz.Model, **changes) -> pz.Problem:
 # ---- the same model in other words ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("integrator", [pz.RungeKutta4(3), pz.Taylor(3), pz.DormandPrince()], ids=["rk4", "taylor", "dp"])
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        pytest.param(pz.RungeKutta4(3), id="rk4"),
+        pytest.param(pz.Taylor(3), id="taylor", marks=pytest.mark.slow),
+        pytest.param(pz.DormandPrince(), id="dp", marks=pytest.mark.slow),
+    ],
+)
 def test_rates_steps_measurements_and_their_derivatives_are_those_of_the_model_in_full(integrator):
     full, named = problem(FULL, integrator=integrator), problem(NAMED, integrator=integrator)
     rng = np.random.default_rng(0)

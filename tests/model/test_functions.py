@@ -314,6 +314,7 @@ def test_a_model_shows_its_calls_and_roots(capsys):
     assert "station_table" not in shown and len(max(shown.splitlines(), key=len)) < 400
 
 
+@pytest.mark.slow  # kernels of eight seconds; roots in lanes have a test of their own
 def test_runs_of_a_study_side_by_side_are_the_runs_one_by_one():
     times = np.arange(0.0, 2.0, 0.1)
     scaled = pz.ProcessNoise([0.0, 0.0, 1e-6, 1e-6], "second", "scaled")

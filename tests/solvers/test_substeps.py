@@ -131,6 +131,7 @@ def far_apart(integrator=None) -> tuple[pz.Problem, pz.Tracking]:
 
 
 @pytest.mark.usefixtures("uncompiled")
+@pytest.mark.slow  # kernels of eight seconds
 def test_the_worst_steps_are_not_passed_over():
     """The default's ten substeps between measurements six hours apart: as wrong as can be, and as sure of itself as ever."""
     problem, tracking = far_apart()
