@@ -93,7 +93,7 @@ def located(e, t, h, x, p, high):
             low = s
         else:
             top = s
-    s, low = high * 0.5 * (low + top), 0.0
+    s, low, width = high * 0.5 * (low + top), 0.0, high
     for _ in range(60):
         events_into(t + s * h, substep(t, s * h, x, p), p, 4 * EVENTS)
         value, rate = side * p.work[4 * EVENTS + e], side * h * p.work[5 * EVENTS + e]
@@ -102,8 +102,10 @@ def located(e, t, h, x, p, high):
         else:
             high = s
         step = value / rate if rate < 0.0 else inf
-        after = s - step if low <= s - step <= high else 0.5 * (low + high)
-        if fabs(after - s) <= 1e-7:  # whose square is left
+        inside = low <= s - step <= high
+        after = s - step if inside else 0.5 * (low + high)
+        bend = (second + 3.0 * third * s / width) / (width * width)  # of the cubic: what Newton's method leaves
+        if fabs(after - s) <= 1e-7 or (inside and fabs(bend) * step * step <= 1e-10 * fabs(rate)):
             return after
         s = after
     return s
