@@ -21,6 +21,7 @@ def specs(tmp_path, monkeypatch):
     monkeypatch.setenv("PIAZZI_CACHE", str(tmp_path))
     monkeypatch.delenv("PIAZZI_JIT", raising=False)
     monkeypatch.setattr(ahead, "processors", lambda: 2)
+    monkeypatch.setattr(ahead, "ANY", 2)
     for remembered in (folder.private_folder, folder.writable_folder):
         remembered.cache_clear()
     yield [KernelSpec(MODEL, pz.RungeKutta4().scheme, fragments) for fragments in FRAGMENTS]
@@ -40,8 +41,11 @@ def test_what_is_missing_is_compiled_by_others_with_progress(specs, caplog):
     assert ahead.compile_ahead(specs) == 0
 
 
-def test_one_module_or_one_processor_begins_no_process(specs, monkeypatch):
+def test_few_modules_or_one_processor_begin_no_process(specs, monkeypatch):
     monkeypatch.setattr(ahead, "_started", None)
+    monkeypatch.setattr(ahead, "ANY", 3)
+    assert ahead.compile_ahead(specs) == 0
+    monkeypatch.setattr(ahead, "ANY", 2)
     assert ahead.compile_ahead(specs[:1]) == 0
     monkeypatch.setattr(ahead, "processors", lambda: 1)
     assert ahead.compile_ahead(specs) == 0

@@ -17,7 +17,8 @@ from piazzi.kernels.folder import private_folder, writable_folder
 from piazzi.kernels.spec import KernelSpec
 
 LOGGER = logging.getLogger("piazzi.kernels")
-FEWEST = 2  # kernels for which other processes are begun: one takes as long to begin as a small kernel to compile
+# Kernels for which other processes are begun, which take as long to begin as a small one to compile: of dear models, of any
+DEAR, ANY = 2, 4
 PROGRAM = "from piazzi.kernels.ahead import main; main()"
 
 
@@ -31,13 +32,14 @@ def processors() -> int:
 def compile_ahead(specs: Iterable[KernelSpec]) -> int:
     """Compile what of these modules is not there yet, in as many processes as there are processors; how many that were.
 
-    Each is told at level INFO on the logger ``piazzi.kernels`` as it begins.  Does nothing on one processor, for one module,
+    Each is told at level INFO on the logger ``piazzi.kernels`` as it begins.  Does nothing on one processor, for few modules,
     and where nothing can be kept.  Whatever fails here is compiled when it is needed.
     """
-    if not is_compiled() or processors() < FEWEST or not sys.executable or private_folder()[0] is None:
+    if not is_compiled() or processors() < DEAR or not sys.executable or private_folder()[0] is None:
         return 0
     waiting = sorted(missing(specs), key=_effort, reverse=True)
-    if len(waiting) < FEWEST or writable_folder() is None:
+    dear = any(spec.unit or spec.apart is not None for spec in waiting)
+    if len(waiting) < (DEAR if dear else ANY) or writable_folder() is None:
         return 0
     _Crew(waiting).work()
     return len(waiting)
