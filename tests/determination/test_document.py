@@ -1,6 +1,7 @@
 """The result by its contract: keys and their order, units, counts, frames and scales, and that files say the same."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi import earth
+from piazzi.determination.against import against
+from piazzi.formats import Ephemeris, oem_text
 from piazzi.orbit import state_axes
 from tests.determination.fixing import EPOCH, observations, truth
 
@@ -123,6 +126,19 @@ def test_products_hold_the_same_orbit(found, tmp_path):
         found.write(tmp_path / "a.xyz")
     with pytest.raises(OSError, match="no folder"):
         found.write(tmp_path / "nowhere" / "a.oem")
+
+
+def test_the_difference_to_another_orbit_is_told_along_its_axes_and_in_sigma(found, tmp_path):
+    """An orbit 30 m ahead along the track is so, and nothing else."""
+    arc = found.ephemeris(step=600.0).arcs[0]
+    axes = np.array([state_axes(r, v)[1, :3] for r, v in zip(arc.position, arc.velocity, strict=True)])
+    other = Ephemeris(arcs=(replace(arc, position=arc.position + 30.0 * axes),))
+    (tmp_path / "other.oem").write_text(oem_text(other))
+    told = replace(found, notes={"against": {"file": "other.oem", **against(found, tmp_path / "other.oem").to_dict()}})
+    rms = told.to_dict()["against"]["rms"]
+    assert rms["T"] == pytest.approx(30.0, rel=1e-3) and rms["R"] < 0.01 and rms["N"] < 0.01
+    assert told.to_dict()["against"]["in_sigma"]["rms"]["T"] > 1.0
+    assert "Against other.oem: rms R" in str(told) and "in sigma R" in str(told)
 
 
 def test_covariances_that_are_too_small_are_written_larger_and_it_is_said(path, tmp_path):

@@ -47,14 +47,15 @@ def document(found: Any) -> dict[str, Any]:
         "residuals": groups(found),
         "rejected": rejected(found),
         "modes": list(found.modes) if known else [],
-        "held": None if found.held is None else holding.to_dict(found.setup, found.held, found.scale),
         "verdict": {key: sentence.to_dict() for key, sentence in found.verdict.items()},
-        "published": [beside(found.orbit, one) for one in found.case.published] if known else [],
         "forces": dict(found.setup.chosen.facts),
         "left_out": {**found.setup.chosen.left_out, **found.setup.measured.left_out},
         "assumed": list(found.setup.assumed),
         "data": data(found),
+        # beside the schema
         "about": found.setup.measured.about,
+        "held": None if found.held is None else holding.to_dict(found.setup, found.held, found.scale),
+        "published": [beside(found.orbit, one) for one in found.case.published] if known else [],
         **({} if found.setup.earlier is None else {"prior": prior(found)}),
         **{key: value for key, value in found.notes.items() if key in ("estimators", "against", "command")},
     }

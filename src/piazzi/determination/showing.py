@@ -140,6 +140,8 @@ def remarks(facts: dict[str, Any]) -> Iterator[str]:
     if "against" in facts:
         apart = facts["against"]
         rms = ", ".join(f"{axis} {number(value, 3)} m" for axis, value in apart["rms"].items())
+        share = apart["in_sigma"]
+        rms += "" if share is None else ", in sigma " + ", ".join(f"{a} {number(v, 3)}" for a, v in share["rms"].items())
         yield f"Against {apart['file']}: rms {rms} at {apart['count']:,} times from {apart['first']} to {apart['last']}."
     for what, count in facts["left_out"].items():
         yield f"Left out: {what}{f' ({count:,})' if isinstance(count, int) else f': {count}'}."
