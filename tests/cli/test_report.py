@@ -59,3 +59,16 @@ def test_bad_places_and_sources_are_refused(call, tmp_path):
     assert "b612" in call("report", "b612-rnge", "-o", tmp_path / "page.html").refused()
     assert "missing argument" in call("report").refused().lower()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file"]
+
+
+def test_a_page_says_how_it_was_made(call, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text(call("scenarios", "show", "b612-range").out + "\n# <b>mine</b> & nobody else's\n")
+    path = tmp_path / "page.html"
+    found = call("report", own, "b612-range-q0", "--with", "ekf", "--seed", "4", "--title", "A <title>", "-o", path)
+    assert found.status == 0
+    text = path.read_text()
+    assert "<title>A &lt;title&gt;</title>" in text and "<h1>A &lt;title&gt;</h1>" in text
+    assert "Seed 4." in text and "# &lt;b&gt;mine&lt;/b&gt; &amp; nobody else&#x27;s" in text
+    assert text.count("<h3>How it was made</h3>") == 2
+    assert text.count("<pre") == 4  # the command and the scenario, twice

@@ -268,13 +268,52 @@ def test_hostile_names_are_text(open_page, comparison, tmp_path):
         assert "</script><script>hacked=1</script><img src=x onerror=hacked=1>" in page.locator(place).first.inner_text()
 
 
+def test_the_estimate_itself_is_shown(open_page, report, comparison):
+    page = open_page(report)
+    table = page.locator("#t0 table", has_text="At the last measurement")
+    for i, name in enumerate(comparison.problem.model.names):
+        cells = table.locator("tbody tr").nth(i).locator("td").all_inner_texts()
+        assert table.locator("tbody th").nth(i).inner_text() == name
+        for cell, estimate in zip(cells, comparison.views.values(), strict=False):
+            value, sigma = (float(part) for part in cell.split(" ± "))
+            assert sigma == pytest.approx(np.sqrt(estimate.covariance[-1, i, i]), rel=0.06)
+            assert value == pytest.approx(estimate.mean[-1, i], abs=0.6 * sigma)
+    seen = """() => { const chart = TABS[0].drawings.find((d) => d.spec.title === "x over time");
+        const [band, line] = chart.lines; return [band.upper, band.lower, line.y].map((v) => Array.from(v)); }"""
+    upper, lower, middle = page.evaluate(seen)
+    ekf = comparison.estimates["ekf"]
+    sigma = np.sqrt(ekf.covariance[:, 0, 0])
+    assert np.allclose(middle, ekf.mean[:, 0], rtol=2**-16)
+    assert np.allclose(np.array(upper) - middle, 3 * sigma, rtol=1e-3) and np.allclose(
+        upper + np.array(lower), 2 * np.array(middle)
+    )
+
+
+def test_kinds_of_measurements_have_axes_of_their_own(open_page, tmp_path):
+    """A range in metres and a turn rate in rad/s stand in the same column: two charts, each with its unit."""
+    sensors = [
+        pz.Sensor("range", {"r": "sqrt(x**2 + 4)"}, units={"r": "m"}),
+        pz.Sensor("gyro", {"w": "v/2"}, units={"w": "rad/s"}),
+    ]
+    model = pz.Model(["x", "v"], {"x": "v", "v": "0"}, sensors)
+    stations = [pz.Station("radar", "range", [1.0]), pz.Station("box", "gyro", [1e-6])]
+    problem = pz.Problem(model, pz.Gaussian([5.0, 1.0], [1.0, 1.0]), stations=stations)
+    tracking = pz.simulate(problem, np.arange(20.0), np.random.default_rng(0))
+    found = compare(problem, tracking, {"ekf": pz.ExtendedKalmanFilter()})
+    page = open_page(write_page(tmp_path / "p.html", "P", [comparison_tab(found)]))
+    seen = """() => TABS[0].drawings.filter((d) => d.spec.title.startsWith("Innovations"))
+        .map((d) => [d.spec.title, d.spec.y.show[0]])"""
+    assert page.evaluate(seen) == [["Innovations of r", "m"], ["Innovations of w", "deg/s"]]
+
+
 def test_without_truth_panels_say_so(open_page, comparison, tmp_path):
     blind = replace(comparison.tracking, truth=None)
     bare = compare(comparison.problem, blind, {"ekf": pz.ExtendedKalmanFilter()})
     page = open_page(write_page(tmp_path / "report.html", "Report", [comparison_tab(bare)]))
     text = page.locator("main").inner_text()
     assert "truth is not known" in text and "NEES needs the truth" in text
-    assert page.locator("#t0 .plot svg").count() >= 8
+    assert page.locator("#t0 .plot svg").count() >= 5
+    assert "State by state" not in text and "Error of" not in text  # no error where no truth is
 
 
 def test_one_epoch_and_a_failed_estimator_make_a_page(open_page, comparison, tmp_path):

@@ -36,6 +36,7 @@ def _lags(context: click.Context, parameter: click.Parameter, text: str | None) 
     help="Also compare sliding windows of these lengths, e.g. 10,50,200.",
 )
 @click.option("--observability", "seen", is_flag=True, help="Also analyse the observability of the first state.")
+@click.option("--title", metavar="TEXT", help="Title of the page.")
 @options.seed
 @options.scenario
 @options.recording
@@ -45,6 +46,7 @@ def command(
     output_file: str,
     lags: tuple[int, ...],
     seen: bool,
+    title: str | None,
     seed: int,
     scenario: str | None,
     recording: Recording,
@@ -71,11 +73,11 @@ def command(
         rows = source.lower().endswith(".csv") or is_tracking(source, scenario)
         of_rows = (scenario, recording) if rows else (None, None)
         name, comparison, warning = run_comparison(source, estimators, seed, *of_rows, bar=True)
-        title, radius = results.title_and_planet(source, name, scenario)
+        named, radius = results.title_and_planet(source, name, scenario)
         more, well = _more(comparison, lags, seen)
-        tabs.append(comparison_tab(comparison, title=title, planet_radius=radius, more=more, warning=warning))
+        tabs.append(comparison_tab(comparison, title=named, planet_radius=radius, more=more, warning=warning))
         success &= comparison.success and well
-    wrote = results.write_page(output_file, tabs)
+    wrote = results.write_page(output_file, tabs, title)
     output.print_rich(f"Wrote {wrote}: open it in a browser.")
     return DONE if success else NOT_ESTIMATED
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from piazzi.cli.options import F
 from piazzi.cli.running import DONE, NOT_ESTIMATED
 
 if TYPE_CHECKING:
-    from piazzi.present.report import Tab
+    from piazzi.present.report import Section, Tab
     from piazzi.problem import Problem, Tracking
 
 
@@ -119,10 +120,57 @@ def title_and_planet(source: str, name: str, scenario: str | None) -> tuple[str,
     return found.title or name, found.picture.planet_radius
 
 
-def write_page(path: str, tabs: Sequence[Tab]) -> Path:
-    """Write the page of these tabs; returns its path."""
+def write_page(path: str, tabs: Sequence[Tab], title: str | None = None) -> Path:
+    """Write the page of these tabs, with how it was made; returns its path."""
+    from dataclasses import replace
+
     from piazzi import __version__
     from piazzi.present.report import write_page as write
 
-    title = tabs[0].title if len(tabs) == 1 else f"{len(tabs)} problems"
-    return write(path, f"Piazzi report: {title}", tabs, foot=f"Made by Piazzi {__version__}. The page needs no network.")
+    shown = title or f"Piazzi report: {tabs[0].title if len(tabs) == 1 else f'{len(tabs)} problems'}"
+    sources = _sources()
+    told = [
+        replace(tab, sections=[*tab.sections, _made(sources[i] if len(sources) == len(tabs) else None)])
+        for i, tab in enumerate(tabs)
+    ]
+    return write(path, shown, told, foot=f"Made by Piazzi {__version__}. The page needs no network.")
+
+
+def _parameters() -> dict[str, Any]:
+    context = click.get_current_context(silent=True)
+    return dict(context.params) if context is not None else {}
+
+
+def _sources() -> list[str]:
+    """The sources that the command was given, the scenario of theirs in their place."""
+    given = _parameters()
+    named = given.get("sources") or ([given["source"]] if given.get("source") else [])
+    return [str(given.get("scenario") or one) for one in named]
+
+
+def _scenario_text(source: str) -> str | None:
+    """What a scenario says, letter by letter; None for what is none, or can be read no more, as standard input."""
+    from piazzi.scenarios import names, show
+
+    if source in names():
+        return show(source)
+    try:
+        return Path(source).read_text(encoding="utf-8") if source.lower().endswith(".toml") else None
+    except (OSError, ValueError):
+        return None
+
+
+def _made(source: str | None) -> Section:
+    """The command, the version and the date, the seed of what was simulated, and the scenario."""
+    from datetime import UTC, datetime
+
+    from piazzi import __version__
+    from piazzi.determination.determining import plain_command
+    from piazzi.present.report import Section
+    from piazzi.present.report.blocks import Block, Code, Text
+
+    seed = _parameters().get("seed")
+    facts = [f"Piazzi {__version__}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC.", *([] if seed is None else [f"Seed {seed}."])]
+    scenario = _scenario_text(source) if source else None
+    blocks: list[Block] = [Code(plain_command(["piazzi", *sys.argv[1:]])), Text([" ".join(facts)])]
+    return Section("How it was made", [*blocks, *([Code(scenario)] if scenario else ())], folded=True)

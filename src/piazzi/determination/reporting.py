@@ -69,6 +69,8 @@ def tab(found: Any) -> Tab:
 def _times(found: Any, path: Sampled | None) -> Any:
     """Times of the cursor: those of the orbit between the measurements, where all of them are drawn."""
     epochs = found.estimate.times
+    if path is not None and path.about == "sun":
+        return path.times
     if path is None or path.times[0] > epochs[0]:
         return epochs
     return path.times[path.times <= epochs[-1] + 1e-6]

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination.page.ecliptic import ecliptic
 from piazzi.determination.page.sampled import Sampled, fixed
 from piazzi.determination.residuals import table
 from piazzi.earth import azimuth_elevation_range
@@ -26,6 +27,8 @@ _SKY = "North is up, east is right, the zenith in the middle. Crosses were not u
 
 def sections(found: Any, path: Sampled | None, rows: Sequence[Rows]) -> list[Section]:
     """The orbit about the Earth, and skies."""
+    if path is not None and path.about == "sun":
+        return [ecliptic(found, path)]
     out = []
     if path is not None:
         factor, note = _tube(path)
@@ -41,7 +44,7 @@ def sections(found: Any, path: Sampled | None, rows: Sequence[Rows]) -> list[Sec
 
 def station_rows(found: Any, path: Sampled | None) -> list[Rows]:
     """Measurements of every station in the order of time, with where the object was; none without an orbit."""
-    if path is None:
+    if path is None or path.about == "sun":
         return []
     columns = table(found)
     zero = found.setup.measured.epoch

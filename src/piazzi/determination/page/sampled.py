@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.beliefs import beliefs
-from piazzi.determination.centres import EARTH
 from piazzi.earth import body, rotation
 from piazzi.orbit import state_axes
 from piazzi.problem.checks import Array
@@ -32,6 +31,7 @@ class Sampled:
     turned : (T,), angle of the Earth, rad
     sun : (T, 3), direction of the Sun, fixed to the Earth
     period : of a revolution, s; that of the whole where it does not come back
+    about : what it goes about; about the Sun places are those of the mean, and nothing turns
     """
 
     times: Array
@@ -42,6 +42,7 @@ class Sampled:
     turned: Array
     sun: Array
     period: float
+    about: str = "earth"
 
     @property
     def measured(self) -> Array:
@@ -53,7 +54,7 @@ class Sampled:
         """Standard deviations (T, 6) of position and velocity along R, T and N."""
         known = self.measured
         out = np.full((len(self.times), 6), np.nan)
-        axes = state_axes(self.mean[known, :3], self.mean[known, 3:], "RTN", EARTH.mu)
+        axes = state_axes(self.mean[known, :3], self.mean[known, 3:])
         turned = axes @ self.covariance[known] @ np.swapaxes(axes, 1, 2)
         out[known] = np.sqrt(np.maximum(np.diagonal(turned, axis1=1, axis2=2), 0.0))
         return out
@@ -68,7 +69,10 @@ def sampled(found: Any) -> Sampled | None:
     if not (np.isfinite(estimate.mean).all() and np.isfinite(estimate.covariance).all()):
         return None
     first, last = float(estimate.times[0]), float(estimate.times[-1])
-    period = _period(estimate.mean[found.setup.solution, :6], last - first)
+    centre = found.setup.measured.centre
+    if centre.name != "earth":
+        return _about_sun(found, first, last)
+    period = _period(estimate.mean[found.setup.solution, :6], last - first, centre.mu)
     for end in (max(last, first + period), last):
         start = max(first, end - period * MOST / EACH)
         times = np.linspace(start, end, int(np.clip((end - start) / period * EACH, LEAST, MOST)))
@@ -96,7 +100,20 @@ def fixed(position: Array, epochs: Any) -> tuple[Array, Array, Array]:
     return np.einsum("tij,tj->ti", R, position), angle, R
 
 
-def _period(state: Array, otherwise: float) -> float:
+def _about_sun(found: Any, first: float, last: float) -> Sampled | None:
+    """Over the measurements and as long again, which is the prediction."""
+    for end in (2.0 * last - first, last):
+        times = np.linspace(first, end, LEAST)
+        try:
+            mean, P = beliefs(found.setup, found.estimate, [found.setup.measured.epoch + float(t) for t in times])
+        except ValueError:  # tables end
+            continue
+        still = np.zeros(LEAST)
+        return Sampled(times, mean, P, mean[:, :3], np.full((LEAST, 6), np.nan), still, mean[:, :3], last - first, "sun")
+    return None
+
+
+def _period(state: Array, otherwise: float, mu: float) -> float:
     """Of the ellipse that it is on."""
-    energy = 0.5 * float(state[3:] @ state[3:]) - EARTH.mu / float(np.linalg.norm(state[:3]))
-    return float(2.0 * np.pi * np.sqrt((-0.5 * EARTH.mu / energy) ** 3 / EARTH.mu)) if energy < 0 else max(otherwise, 1.0)
+    energy = 0.5 * float(state[3:] @ state[3:]) - mu / float(np.linalg.norm(state[:3]))
+    return float(2.0 * np.pi * np.sqrt((-0.5 * mu / energy) ** 3 / mu)) if energy < 0 else max(otherwise, 1.0)

@@ -28,6 +28,17 @@ def component_of(problem: Problem, column: int) -> tuple[str, str]:
     return " / ".join(dict.fromkeys(name for name, _ in found)), unit_of(unit for _, unit in found)
 
 
+def kinds_of(problem: Problem, column: int) -> dict[tuple[str, str], list[int]]:
+    """Name and unit of what stations measure in a column, and the indices of those that do."""
+    out: dict[tuple[str, str], list[int]] = {}
+    for s, station in enumerate(problem.stations):
+        sensor = problem.model.sensor(station.sensor)
+        if sensor.width > column:
+            name = sensor.components[column]
+            out.setdefault((name, dict(sensor.units)[name]), []).append(s)
+    return out
+
+
 def measurements(ax: Axes, problem: Problem, tracking: Tracking, column: int = 0) -> Axes:
     """One component of the measurements against time, a colour for each station."""
     from matplotlib.ticker import MultipleLocator

@@ -115,7 +115,7 @@ def orbit_page(comparison: Comparison, planet_radius: float | None = None) -> Fi
     for ax, plane in zip(axes, found_planes, strict=False):
         orbit(ax, estimate, name=name, planet_radius=planet_radius, plane=plane)
         ax.set_anchor("C")
-    axes[0].set_title(f"Orbit by {label_of(name, estimate.view)}")
+    axes[0].set_title(f"{'Orbit' if planet_radius else 'Path'} by {label_of(name, estimate.view)}")
     position_at(axes[-1], comparison.views)
     found = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=6)

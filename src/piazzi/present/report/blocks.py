@@ -48,7 +48,7 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Values against x: a line, points, thick spans, or a band of +-y about zero.
+    """Values against x: a line, points, thick spans, or a band of +-y about zero, or about the values `about`.
 
     `key` is the index of its legend entry, -1 for none.  `notes` are words on each value, "" for none, shown under the pointer.
 
@@ -64,6 +64,7 @@ class Line:
     colour: str = "#7A7A7A"
     dash: tuple[int, ...] = ()
     notes: Sequence[str] = ()
+    about: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

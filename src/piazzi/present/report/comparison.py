@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from piazzi.evaluate import Comparison
 from piazzi.evaluate.comparison_table import columns
 from piazzi.present.figures.style import time_display
+from piazzi.present.report.answer import answer, measured
 from piazzi.present.report.blocks import CursorValues, Point, Section, Tab, Table, Text
 from piazzi.present.report.panels import consistency, group_charts, innovations, passes, state_charts
 from piazzi.present.report.paths import orbits
@@ -17,7 +18,6 @@ from piazzi.present.tables import summary
 _PLAY = "Dots and 3-sigma ellipses are where the cursor is: play, drag the slider, or click on any chart over time."
 _UNKNOWN = "The truth is not known, so errors are not shown; what the covariances expect of them is."
 _INSIDE = "The error of the estimator looked at closely, within three sigma of its own covariance: it should rarely leave them."
-_BANDS = "The truth is not known, so there is no error to draw: three sigma of the estimator looked at closely."
 _CONSISTENCY = (
     "Innovations should look like noise within three sigma. NEES and NIS are squared errors and innovations in units of the"
     " covariance: values that stay above the grey range mean that the covariance is too small."
@@ -62,14 +62,16 @@ def _sections(views: Views, planet_radius: float | None, orbit: bool) -> list[Se
     known = views.truth is not None
     paths = orbits(views, planet_radius) if orbit else []
     return [
-        *([Section("The orbit", paths, _PLAY)] if paths else []),
+        *([Section("The orbit" if planet_radius else "The path", paths, _PLAY)] if paths else []),
+        *answer(views),
+        *([measured(views)] if orbit else []),
         *([Section("Passes", [sights], _PASSES)] if orbit and (sights := passes(views)) else []),
         Section(
             "Errors and their predicted standard deviations",
             [*group_charts(views), CursorValues("Values at the cursor")],
             "" if known else _UNKNOWN,
         ),
-        Section("State by state", state_charts(views), _INSIDE if known else _BANDS),
+        *([Section("State by state", state_charts(views), _INSIDE)] if known else []),
         Section("Consistency", [*innovations(views), *consistency(views)], _CONSISTENCY if known else _CONSISTENCY + _NO_NEES),
     ]
 

@@ -223,6 +223,7 @@ class _Builder:
             "colour": line.colour,
             "dash": list(line.dash),
             "notes": noted(line.notes),
+            "about": None if line.about is None else self.pool.add(line.about),
         }
 
     def _orbit(self, orbit: Orbit) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.metrics import groups
 from piazzi.evaluate.quantities import Display, display_of, unit_of
 from piazzi.present.colours import DASHES, STATIONS
-from piazzi.present.figures.measured import SHORTEST, component_of
+from piazzi.present.figures.measured import SHORTEST, kinds_of
 from piazzi.present.report.blocks import Axis, Chart, Line
 from piazzi.present.report.views import Thinning, Views
 from piazzi.present.squares import Squares, nees_of, nis_of
@@ -149,40 +149,43 @@ def passes(views: Views) -> Chart | None:
 
 
 def innovations(views: Views) -> list[Chart]:
-    """For each component of the measurements the innovations of the estimator looked at closely, within three sigma."""
-    problem, out = views.comparison.problem, []
-    parts = _stations(views)
-    for column in range(problem.model.width):
-        name, unit = component_of(problem, column)
-        bands, points, ends = [], [], []
-        for key, e in enumerate(views.estimates):
-            nu, S = e.innovations[:, column], e.innovation_covariances[:, column, column]
-            sigma = np.sqrt(np.where(np.isnan(nu), np.nan, np.maximum(S, 0.0)))
-            good = np.abs(nu[np.isfinite(nu)])
-            ends.append(max(1.6 * SIGMAS * _typical(sigma), 1.15 * float(np.quantile(good, 0.99)) if good.size else 0.0))
-            for station, rows in parts:
-                if np.isnan(nu[rows]).all():
-                    continue
-                thin = Thinning(len(rows))
-                times = thin.at_places(views.comparison.tracking.row_times[rows])
-                bands.append(Line(times, thin.extremes(sigma[rows]), f"3 sigma{station}", key, "band", SIGMAS))
-                points.append(Line(times, thin.sample(nu[rows], _WILD * sigma[rows]), f"innovation{station}", key, "points"))
-        half = max(ends) or 1.0
-        show = display_of(unit, [half / 1.6])
-        y = Axis(f"innovation of {name}", show, low=-half, high=half)
-        size = max(Thinning(len(rows)).size for _, rows in parts)
-        note = f"Two of every {size:,} are drawn, and what is beyond {_WILD:g} sigma." if size > 1 else ""
-        out.append(Chart(f"Innovations of {name}", views.axis, y, [*bands, *points], single=True, note=note))
-    return out
+    """For each kind of measurement the innovations of the estimator looked at closely, within three sigma, by station."""
+    problem = views.comparison.problem
+    kinds = [(column, *kind) for column in range(problem.model.width) for kind in kinds_of(problem, column).items()]
+    return [_innovation(views, column, name, unit, stations) for column, (name, unit), stations in kinds]
 
 
-def _stations(views: Views) -> list[tuple[str, Array]]:
-    """Rows of each station with its name as labels end; all rows together for one station, or too many to tell apart."""
+def _innovation(views: Views, column: int, name: str, unit: str, stations: Sequence[int]) -> Chart:
+    bands, points, ends = [], [], []
+    parts = rows_of(views, stations)
+    every = np.concatenate([rows for _, rows in parts]) if parts else np.empty(0, dtype=int)
+    for key, e in enumerate(views.estimates):
+        nu, S = e.innovations[:, column], e.innovation_covariances[:, column, column]
+        sigma = np.sqrt(np.where(np.isnan(nu), np.nan, np.maximum(S, 0.0)))
+        good = np.abs(nu[every][np.isfinite(nu[every])])
+        most = 1.15 * float(np.quantile(good, 0.99)) if good.size else 0.0
+        ends.append(max(1.6 * SIGMAS * _typical(sigma[every]), most))
+        for station, rows in parts:
+            if np.isnan(nu[rows]).all():
+                continue
+            thin = Thinning(len(rows))
+            times = thin.at_places(views.comparison.tracking.row_times[rows])
+            bands.append(Line(times, thin.extremes(sigma[rows]), f"3 sigma{station}", key, "band", SIGMAS))
+            points.append(Line(times, thin.sample(nu[rows], _WILD * sigma[rows]), f"innovation{station}", key, "points"))
+    half = max(ends, default=0.0) or 1.0
+    y = Axis(f"innovation of {name}", display_of(unit, [half / 1.6]), low=-half, high=half)
+    size = max((Thinning(len(rows)).size for _, rows in parts), default=1)
+    note = f"Two of every {size:,} are drawn, and what is beyond {_WILD:g} sigma." if size > 1 else ""
+    return Chart(f"Innovations of {name}", views.axis, y, [*bands, *points], single=True, note=note)
+
+
+def rows_of(views: Views, stations: Sequence[int]) -> list[tuple[str, Array]]:
+    """Rows of each of these stations with its name as labels end; all together for one, or too many to tell apart."""
     problem, tracking = views.comparison.problem, views.comparison.tracking
     index = tracking.stations_of(problem)
-    found = [(f", {s.name}", np.flatnonzero(index == i)) for i, s in enumerate(problem.stations)]
+    found = [(f", {problem.stations[i].name}", np.flatnonzero(index == i)) for i in stations]
     found = [(name, rows) for name, rows in found if len(rows)]
-    return found if 1 < len(found) <= _MOST_STATIONS else [("", np.arange(len(index)))]
+    return found if 1 < len(found) <= _MOST_STATIONS else [("", np.flatnonzero(np.isin(index, stations)))]
 
 
 def consistency(views: Views) -> list[Chart]:

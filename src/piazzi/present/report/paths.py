@@ -49,7 +49,7 @@ def _plane(views: Views, columns: tuple[int, int], planet_radius: float | None, 
     labels = (f"{names[0]} - {about}", f"{names[1]} - {about}")
     title = f"Close-up about {'the truth' if views.truth is not None else about}{plane}"
     return [
-        Orbit(f"Orbit{plane}", far, names, show, limits, planet_radius, note=_left_out(views)),
+        Orbit(f"{'Orbit' if planet_radius else 'Path'}{plane}", far, names, show, limits, planet_radius, note=_left_out(views)),
         Orbit(title, near, labels, close, close=True),
     ]
 

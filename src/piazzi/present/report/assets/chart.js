@@ -13,6 +13,11 @@ class Chart {
       dash: line.key >= 0 ? tab.keys[line.key].dash : line.dash,
       name: line.key >= 0 ? tab.keys[line.key].label : line.label,
     }));
+    for (const line of this.lines) {
+      const about = line.about === null ? null : array(line.about);
+      line.upper = about ? line.y.map((v, i) => about[i] * fy + v) : line.y;
+      if (line.kind === "band") line.lower = about ? line.y.map((v, i) => about[i] * fy - v) : line.y.map((v) => -v);
+    }
     this.xAxis = scaled(spec.x, fx);
     this.yAxis = scaled(spec.y, fy);
     this.listen();
@@ -38,10 +43,10 @@ class Chart {
   // Limits of y for a stretch of time: its values and what they are compared with, no farther than those of the whole run.
   closer([from, to], whole) {
     const f = this.spec.y.show[1];
-    const within = ({ y, seconds }) => y.filter((_, i) => seconds[i] >= from && seconds[i] <= to);
-    const values = this.lines.map(within);
+    const within = ({ seconds }, values) => values.filter((_, i) => seconds[i] >= from && seconds[i] <= to);
+    const values = this.lines.map((line) => within(line, line.upper));
     if (!values.some((v) => v.some(Number.isFinite))) return whole;
-    const below = this.lines.filter((line) => line.kind === "band").map((line) => within(line).map((v) => -v));
+    const below = this.lines.filter((line) => line.kind === "band").map((line) => within(line, line.lower));
     const beside = [...this.spec.ranges.flatMap(([low, high]) => [low, high]), ...this.spec.levels.map(([level]) => level)];
     let [low, high] = extent([...values, ...below, beside.map((v) => v * f)], this.yAxis);
     if (this.yAxis.scale === "symmetric") {
@@ -74,7 +79,7 @@ class Chart {
     for (const v of ticks(this.sx, 70)) {
       const at = this.sx.place(v);
       grid.append(element("line", { x1: at, x2: at, y1: bottom, y2: bottom + 4, class: "tick" }));
-      grid.append(element("text", { x: at, y: bottom + 17, "text-anchor": "middle" }, tickText(v)));
+      grid.append(element("text", { x: inward(at, tickText(v), width), y: bottom + 17, "text-anchor": "middle" }, tickText(v)));
     }
     grid.append(element("line", { x1: left, x2: right, y1: bottom, y2: bottom, class: "axis" }));
     svg.append(grid);
@@ -124,10 +129,10 @@ class Chart {
     for (const line of this.lines) {
       const style = { "data-key": line.key, stroke: line.colour, fill: "none" };
       if (line.kind === "band") {
-        const upper = this.path(line.x, line.y, 1);
+        const upper = this.path(line.x, line.upper);
         line.mark = element("path", { ...style, d: this.ribbon(line), fill: line.colour, stroke: "none", class: "band" });
         this.inside.append(line.mark);
-        line.edge = element("path", { ...style, d: `${upper} ${this.path(line.x, line.y, -1)}`, class: "edge" });
+        line.edge = element("path", { ...style, d: `${upper} ${this.path(line.x, line.lower)}`, class: "edge" });
         this.inside.append(line.edge);
       } else if (line.kind === "points") {
         line.mark = element("path", { ...style, d: this.dots(line), class: "dots" });
@@ -139,10 +144,10 @@ class Chart {
         line.mark = element("path", { ...style, d: this.sticks(line), class: "bars" });
         this.inside.append(line.mark);
       } else if (line.kind === "spans") {
-        line.mark = element("path", { ...style, d: this.path(line.x, line.y, 1), class: "bars" });
+        line.mark = element("path", { ...style, d: this.path(line.x, line.y), class: "bars" });
         this.inside.append(line.mark);
       } else {
-        line.mark = element("path", { ...style, d: this.path(line.x, line.y, 1), "stroke-dasharray": line.dash.join(" "), class: "line" });
+        line.mark = element("path", { ...style, d: this.path(line.x, line.y), "stroke-dasharray": line.dash.join(" "), class: "line" });
         this.inside.append(line.mark);
         if (!this.spec.time) {
           line.edge = element("path", { ...style, d: this.dots(line), class: "dots large" });
@@ -152,7 +157,7 @@ class Chart {
     }
   }
 
-  path(x, y, sign) {
+  path(x, y) {
     let out = "";
     let pen = "M";
     for (let i = 0; i < x.length; i++) {
@@ -160,13 +165,13 @@ class Chart {
         pen = "M";
         continue;
       }
-      out += `${pen}${this.sx.place(x[i]).toFixed(1)} ${this.clamped(sign * y[i])}`;
+      out += `${pen}${this.sx.place(x[i]).toFixed(1)} ${this.clamped(y[i])}`;
       pen = "L";
     }
     return out;
   }
 
-  ribbon({ x, y }) {
+  ribbon({ x, y, upper, lower }) {
     let out = "";
     for (let start = 0; start < x.length; start++) {
       if (Number.isNaN(y[start])) continue;
@@ -176,8 +181,8 @@ class Chart {
       let there = "";
       for (let i = start; i < end; i++) {
         const at = this.sx.place(x[i]).toFixed(1);
-        there += `${i === start ? "M" : "L"}${at} ${this.clamped(y[i])}`;
-        back = `L${at} ${this.clamped(-y[i])}${back}`;
+        there += `${i === start ? "M" : "L"}${at} ${this.clamped(upper[i])}`;
+        back = `L${at} ${this.clamped(lower[i])}${back}`;
       }
       out += `${there}${back}Z`;
       start = end;

@@ -95,7 +95,7 @@ class Orbit {
     for (const v of ticks(x, 90)) {
       const at = x.place(v);
       grid.push(element("line", { x1: at, x2: at, y1: top, y2: bottom }));
-      grid.push(element("text", { x: at, y: bottom + 17, "text-anchor": "middle" }, tickText(v)));
+      grid.push(element("text", { x: inward(at, tickText(v), this.width), y: bottom + 17, "text-anchor": "middle" }, tickText(v)));
     }
     for (const v of ticks(y, 60)) {
       const at = y.place(v);

@@ -51,6 +51,12 @@ function bothSides(scale, count) {
   return out;
 }
 
+// Where the middle of a text is, so that it does not leave the picture.
+function inward(at, text, width) {
+  const half = 3.6 * text.length;
+  return Math.min(Math.max(at, half), width - half);
+}
+
 // 1000 and 0.01 as they are, 10 to some power where that is shorter.
 function tickText(value, step) {
   if (value === 0) return "0";
