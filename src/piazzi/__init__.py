@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from piazzi.determination.determining import determine
     from piazzi.determination.ephemerides import ephemeris
+    from piazzi.determination.figures import figures
     from piazzi.determination.initial import initial_orbits
     from piazzi.determination.initial_result import InitialOrbits
     from piazzi.determination.result import Determination
@@ -129,6 +130,7 @@ _WHERE = {
         "piazzi.present.report": "write_report",
         "piazzi.determination.determining": "determine",
         "piazzi.determination.ephemerides": "ephemeris",
+        "piazzi.determination.figures": "figures",
         "piazzi.determination.initial": "initial_orbits",
         "piazzi.determination.initial_result": "InitialOrbits",
         "piazzi.determination.result": "Determination",
@@ -147,7 +149,7 @@ __all__ = [
     "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise", "Propagation", "Ralston",
     "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter",
     "Station", "Study", "Table", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade",
-    "choose_substeps", "compare", "determine", "difference", "earth", "ephemeris", "formats", "initial_orbits",
+    "choose_substeps", "compare", "determine", "difference", "earth", "ephemeris", "figures", "formats", "initial_orbits",
     "kepler_transition", "load", "observability", "orbit", "passes", "predict", "propagate", "propagate_kepler",
     "read_ephemeris", "read_store", "read_tracking", "save", "scenarios", "simulate", "step_warning", "substep_error",
     "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",

@@ -13,7 +13,7 @@ from piazzi.text import nearest
 GROUPS = {
     "Orbits from tracking": ("determine", "tracking", "propagate", "ephemeris", "difference", "orbits"),
     "Estimators side by side": ("compare", "estimate", "study", "windows", "observability", "report"),
-    "Scenarios and data": ("demo", "scenarios", "simulate", "data"),
+    "Scenarios and data": ("demo", "scenarios", "simulate", "data", "cite"),
 }
 COMMANDS = tuple(name for group in GROUPS.values() for name in group)
 
@@ -67,6 +67,7 @@ def piazzi() -> None:
       piazzi report tracking.npz -o page.html   a self-contained interactive page
       piazzi scenarios list                     what is built in
       piazzi data                               which data are used, how old
+      piazzi cite                               what a paper should name
 
     Exit status: 0 done, 2 bad usage or input, 3 an estimator did not succeed or no
     orbit was determined.

@@ -143,6 +143,9 @@ def _write(found: Determination, case: Case) -> list[str]:
             continue
         found.write(target, span=case.span, step=case.step, formal=case.covariance == "formal")
         wrote.append(f"Wrote {target}")
+    if case.figures is not None:
+        paths = found.figures(case.figures, case.format, case.width)
+        wrote.append(f"Wrote {len(paths)} pictures into {case.figures}")
     if case.report is not None:
         wrote.append(f"Wrote {found.report(case.report)}")
     return wrote

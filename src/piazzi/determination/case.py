@@ -92,6 +92,9 @@ class Case:
     report: str | None = asked(
         None, "DIR", "Write report.html into DIR: one page that works offline; DIR may end in .html.", usual=True
     )
+    figures: str | None = asked(None, "DIR", "Write pictures for papers into DIR.", read.text)
+    format: str = asked("pdf", "NAMES", "Of the pictures: pdf,svg,png,pgf.  [default: pdf]", read.formats)
+    width: str = asked("88mm", "LENGTH", "Of the pictures: 88mm, 3.5in.  [default: 88mm]", read.width)
     json: bool = asked(False, "", "Print one JSON object on stdout, and nothing else there.", read.flag, usual=True)
     estimate: Any = said(
         None, "NAMES", 'Unknowns beside the orbit: "cd/12h cr bias.range.7090/pass=1m clock.BER=1ms dv@DATE".', read.unknowns,

@@ -154,3 +154,18 @@ def hold(value: Any, where: str) -> Any:
         return check(value)
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from None
+
+
+def formats(value: Any, where: str) -> str:
+    """Names of formats of pictures."""
+    from piazzi.determination.figures import formats_of
+
+    return ",".join(formats_of(value))
+
+
+def width(value: Any, where: str) -> str:
+    """A width of pictures."""
+    from piazzi.determination.figures import width_of
+
+    width_of(value)
+    return str(value)

@@ -181,6 +181,20 @@ class Determination:
 
         yield from rich(self, console, options)
 
+    def to_latex(self) -> str:
+        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
+        from piazzi.determination.document import document
+        from piazzi.determination.showing import grids
+        from piazzi.evaluate.latex import as_latex
+
+        return as_latex(grids(self, document(self)))
+
+    def figures(self, folder: Any, formats: Any = "pdf", width: Any = "88mm") -> Any:
+        """Write pictures for papers into a folder; returns their paths."""
+        from piazzi.determination.figures import figures
+
+        return figures(self, folder, formats, width)
+
     def __str__(self) -> str:
         from piazzi.evaluate.grids import as_text
 

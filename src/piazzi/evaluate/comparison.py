@@ -16,7 +16,7 @@ from piazzi.estimate.ahead import compile_for
 from piazzi.estimate.estimator import Estimate, Estimator, views_of
 from piazzi.estimate.registry import by_name
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
-from piazzi.evaluate.comparison_table import html, render
+from piazzi.evaluate.comparison_table import grid, html, render
 from piazzi.evaluate.consistency_tests import LONGEST
 from piazzi.evaluate.grids import as_text
 from piazzi.evaluate.rows import Row, evaluate, numbers
@@ -104,6 +104,12 @@ class Comparison(Drawn):
         """In short: which estimators, on what."""
         failed = [name for name, e in self.estimates.items() if not e.success]
         return f"<Comparison of {listed(self.estimates)} on {self.problem!r}{f'; failed: {listed(failed)}' if failed else ''}>"
+
+    def to_latex(self) -> str:
+        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
+        from piazzi.evaluate.latex import as_latex
+
+        return as_latex([grid(self.problem.model, self.rows, self.tracking.values)])
 
     def __str__(self) -> str:
         return as_text(self)

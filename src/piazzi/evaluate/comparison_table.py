@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from piazzi.evaluate.grids import fits, rich_table
+from piazzi.evaluate.grids import Grid, fits, rich_table
 from piazzi.evaluate.judgement import claims, errors_known, expected_nis, failing, fails_at_first_only, not_diverged, tested
 from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, unit_of
 from piazzi.model import Model
@@ -68,6 +68,13 @@ def columns(model: Model, rows: Sequence[Row], values: Array) -> list[Column]:
         Column("", "", "", tuple(_remark(r) for r in rows)),
     ]
     return [c for i, c in enumerate(found) if i < _TEXT_COLUMNS or any(v not in ("", NOTHING) for v in c.texts)]
+
+
+def grid(model: Model, rows: Sequence[Row], values: Array) -> Grid:
+    """The table as text."""
+    shown = columns(model, rows, values)
+    heads = tuple("\n".join(filter(None, (c.title, c.unit and f"[{c.unit}]"))) for c in shown)
+    return Grid("Comparison", heads, tuple(zip(*(c.texts for c in shown), strict=True)), _TEXT_COLUMNS)
 
 
 def _times(value: float | None, factor: float) -> float | None:

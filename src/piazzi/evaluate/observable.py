@@ -186,6 +186,12 @@ class Observability(Drawn):
         """In short: the verdict's first sentence, on what."""
         return f"<{_split(self.verdict)[0].removesuffix('.')}; {self.problem!r}>"
 
+    def to_latex(self) -> str:
+        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
+        from piazzi.evaluate.latex import as_latex
+
+        return as_latex(self.grids())
+
     def __str__(self) -> str:
         return as_text(self)
 

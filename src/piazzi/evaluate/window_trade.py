@@ -204,6 +204,12 @@ class WindowTrade(Drawn):
         """In short: which lengths, on what."""
         return f"<WindowTrade: lags {listed(str(int(lag)) for lag in self.lags)} on {self.problem!r}>"
 
+    def to_latex(self) -> str:
+        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
+        from piazzi.evaluate.latex import as_latex
+
+        return as_latex(self.grids())
+
     def __str__(self) -> str:
         return as_text(self)
 

@@ -34,6 +34,12 @@ class Tracked:
     def _repr_html_(self) -> str:
         return as_html(self.grids(), list(self.sentences()))
 
+    def to_latex(self) -> str:
+        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
+        from piazzi.evaluate.latex import as_latex
+
+        return as_latex(self.grids())
+
     def __str__(self) -> str:
         return as_text(self)
 

@@ -17,10 +17,15 @@ _STATES = "States and constants of the estimator looked at closely, with three s
 _MEASURED = "Measurements as they came, in the colour of the station; residuals are what the estimate looked at closely leaves."
 
 
-def answer(views: Views) -> list[Section]:
-    """Last values with their sigmas, and over time."""
+def answer(views: Views) -> Section:
+    """Last values with their sigmas."""
+    return Section("The estimate", [_last(views)])
+
+
+def over_time(views: Views) -> Section:
+    """States and constants over time."""
     charts = [_over_time(views, i) for i in range(len(views.comparison.problem.model.names))]
-    return [Section("The estimate", [_last(views)]), Section("States over time", charts, _STATES, folded=True)]
+    return Section("States over time", charts, _STATES, folded=True)
 
 
 def measured(views: Views) -> Section:

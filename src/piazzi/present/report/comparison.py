@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from piazzi.evaluate import Comparison
 from piazzi.evaluate.comparison_table import columns
 from piazzi.present.figures.style import time_display
-from piazzi.present.report.answer import answer, measured
+from piazzi.present.report.answer import answer, measured, over_time
 from piazzi.present.report.blocks import CursorValues, Point, Section, Tab, Table, Text
 from piazzi.present.report.panels import consistency, group_charts, innovations, passes, state_charts
 from piazzi.present.report.paths import orbits
@@ -63,8 +63,7 @@ def _sections(views: Views, planet_radius: float | None, orbit: bool) -> list[Se
     paths = orbits(views, planet_radius) if orbit else []
     return [
         *([Section("The orbit" if planet_radius else "The path", paths, _PLAY)] if paths else []),
-        *answer(views),
-        *([measured(views)] if orbit else []),
+        answer(views),
         *([Section("Passes", [sights], _PASSES)] if orbit and (sights := passes(views)) else []),
         Section(
             "Errors and their predicted standard deviations",
@@ -72,6 +71,8 @@ def _sections(views: Views, planet_radius: float | None, orbit: bool) -> list[Se
             "" if known else _UNKNOWN,
         ),
         *([Section("State by state", state_charts(views), _INSIDE)] if known else []),
+        over_time(views),
+        *([measured(views)] if orbit else []),
         Section("Consistency", [*innovations(views), *consistency(views)], _CONSISTENCY if known else _CONSISTENCY + _NO_NEES),
     ]
 

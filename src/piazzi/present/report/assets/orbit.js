@@ -66,7 +66,9 @@ class Orbit {
       this.still.append(track.whole);
       this.moving.append(track.trail);
     }
-    this.moving.append(track.ellipse, track.dot);
+    const named = track.key < 0 && track.label !== "truth"; // a body beside the object
+    track.name = element("text", { class: "reference" }, named ? track.label : "");
+    this.moving.append(track.ellipse, track.dot, track.name);
   }
 
   background() {
@@ -139,6 +141,8 @@ class Orbit {
     const [cx, cy] = [this.px(x), this.py(y)];
     track.dot.setAttribute("cx", cx);
     track.dot.setAttribute("cy", cy);
+    track.name.setAttribute("x", cx + 7);
+    track.name.setAttribute("y", cy - 5);
     if (!oval) return;
     for (const [name, value] of [["cx", cx], ["cy", cy], ["rx", oval.a * this.unit], ["ry", oval.b * this.unit]]) track.ellipse.setAttribute(name, value);
     track.ellipse.setAttribute("transform", `rotate(${(-oval.angle * 180) / Math.PI} ${cx} ${cy})`);

@@ -1,0 +1,99 @@
+"""Pictures and tables of a determination for papers, against what they are of."""
+
+import re
+
+import numpy as np
+import pytest
+
+import piazzi as pz
+from piazzi.determination.figures import drawn, formats_of, width_of
+from piazzi.evaluate.grids import Grid
+from piazzi.evaluate.latex import as_latex
+from piazzi.present.colours import STATIONS
+from tests.determination.fixing import observations, truth
+
+T = np.arange(0.0, 43200.0, 900.0)
+SIGMA = 5.0
+
+
+@pytest.fixture(scope="module")
+def found():
+    noisy = truth(T)[:, :3] + SIGMA * np.random.default_rng(1).standard_normal((len(T), 3))
+    noisy[7] += 1e4
+    return pz.determine(observations(noisy, T, SIGMA))
+
+
+def test_they_are_written_at_their_width(found, tmp_path):
+    paths = pz.figures(found, tmp_path / "new", formats="svg,pdf", width="88mm")
+    names = {path.stem for path in paths}
+    assert names == {"residuals-x", "residuals-y", "residuals-z", "sigma", "orbit", "ground-track"}
+    assert {path.suffix for path in paths} == {".svg", ".pdf"} and len(paths) == 2 * len(names)
+    for path in paths:
+        data = path.read_bytes()
+        if path.suffix == ".svg":
+            (width,) = re.findall(rb'<svg[^>]* width="([0-9.]+)pt"', data)
+        else:
+            (width,) = re.findall(rb"/MediaBox ?\[ ?0 0 ([0-9.]+)", data)
+        assert float(width) == pytest.approx(88.0 / 25.4 * 72.0, abs=0.1)
+    again = found.figures(tmp_path / "again", "svg,pdf")
+    assert [a.read_bytes() for a in again] == [p.read_bytes() for p in paths]  # nothing of the clock
+
+
+def test_axes_have_units_and_no_titles(found):
+    for name, figure in drawn(found, 3.5):
+        for ax in (ax for ax in figure.axes if ax.axison):
+            assert ax.get_title() == "", name
+            assert ax.get_ylabel().endswith("]"), name
+            assert ax.get_xlabel().endswith("]") or "hours past" in ax.get_xlabel(), name
+
+
+def test_residuals_are_those_of_the_determination(found):
+    figure = dict(drawn(found, 3.5))["residuals-x"]
+    used, left = figure.axes[0].lines[:2]
+    own = found.residuals.where(found.residuals.kind == "x", drop=True)
+    keep = own.used.values.astype(bool)
+    assert np.allclose(used.get_ydata(), own.o_minus_c.values[keep])
+    assert np.allclose(used.get_xdata() * 3600.0, own.time.values[keep])
+    assert len(left.get_xdata()) == 1 and left.get_marker() == "x"
+    low, high = figure.axes[0].get_ylim()
+    assert low < left.get_ydata()[0] < high  # a kilometre off, and seen
+
+
+def test_colours_differ_for_every_eye():
+    """Those with any two of the three kinds of cones tell them apart by what these two see."""
+    rgb = np.array([[int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)] for c in STATIONS]) ** 2.2
+    lms = rgb @ np.array([[0.314, 0.155, 0.018], [0.640, 0.759, 0.109], [0.047, 0.087, 0.873]])
+    for missing in range(3):
+        seen = np.delete(lms, missing, axis=1)
+        apart = np.linalg.norm(np.cbrt(seen)[:, None] - np.cbrt(seen)[None], axis=2)
+        assert apart[np.triu_indices(len(seen), 1)].min() > 0.03
+
+
+@pytest.mark.parametrize(("call", "says"), [
+    (lambda: formats_of("pdf,gif"), "--format 'gif'"), (lambda: width_of("wide"), "--width 'wide'"),
+    (lambda: width_of("9m"), "88mm"),
+    (lambda: width_of("1mm"), "between 20 mm"),
+])  # fmt: skip
+def test_what_cannot_be_is_refused(call, says):
+    with pytest.raises(ValueError, match=re.escape(says)):
+        call()
+
+
+def test_widths_have_units():
+    assert width_of("88") == width_of("88mm") == width_of("8.8cm") == 88.0
+    assert width_of("3.5in") == pytest.approx(88.9)
+
+
+def test_latex_has_every_cell_and_nothing_that_latex_reads(found):
+    text = found.to_latex()
+    assert text.count(r"\begin{tabular}") == text.count(r"\end{tabular}") == 4  # state, elements, residuals, what was not used
+    state = text.split(r"\end{tabular}")[0]
+    rows = [line.split(" & ") for line in state.splitlines() if line.endswith(r"\\")][1:]
+    assert [row[0] for row in rows] == ["x", "y", "z", "vx", "vy", "vz", r"cr\_a\_m"]
+    for row in rows:
+        value, sigma = (cell.strip("$") for cell in row[1:3])
+        assert len(value.partition(".")[2]) == len(sigma.partition(".")[2])  # rounded by the sigma
+        assert len(sigma.replace(".", "").lstrip("0")) == 2
+    grid = Grid("a_b", ("", "m^2\n[%]"), (("50% & {x}_$", "-1.5e-07"),))
+    body = as_latex([grid]).splitlines()[3:]
+    assert body[0] == r" & m$^{2}$ [\%] \\" and body[2] == r"50\% \& \{x\}\_\$ & $-1.5 \times 10^{-7}$ \\"
