@@ -78,6 +78,7 @@ def test_passes_are_parted_by_gaps_and_by_blocks_that_follow_each_other(given):
         assert [len(own) for own in passes(parted, np.ones(60, dtype=bool))][: len(expected)] == expected
 
 
+@pytest.mark.slow  # kernels of ten seconds
 def test_predictions_are_those_of_a_fit_without_the_pass(given):
     """The step from the whole solution against the graph that never saw the pass, with the same derivatives."""
     one = approached(noisy(given, 3))
