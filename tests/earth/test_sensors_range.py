@@ -178,3 +178,11 @@ def test_what_there_is_not_is_refused_in_one_line():
         sensors.range().at(YARRAGADEE, EPOCH, 1.0, rangebias=1.0)
     with pytest.raises(ValueError, match="give sigma="):
         sensors.range().at(YARRAGADEE, EPOCH)
+
+
+def test_definitions_of_media_go_with_the_functions_of_the_forces():
+    """Names that forces give to functions (the thermosphere's ``air``) are none of a sensor's definitions."""
+    for troposphere in ("saastamoinen", "mendes-pavlis"):
+        sensor = sensors.range("two-way", troposphere=troposphere)
+        forces = earth.Forces(drag="msis")
+        assert not {name for name, _ in sensor.definitions} & {*forces.model([]).functions}

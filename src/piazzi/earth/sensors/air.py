@@ -57,8 +57,8 @@ class Air:
             self.numbers |= {name: _COEFFICIENTS[name] for name in MAPPINGS}
             zenith, slant = self.add("zenith", media.saastamoinen), self.add("slant", media.mapping)
             text = f"{zenith}_hydrostatic*{slant}_map_hydrostatic + {zenith}_wet*{slant}_map_wet"
-            self.definitions[f"{self.prefix}air"] = text
-            return f"{self.prefix}air"
+            self.definitions[f"{self.prefix}air_delay"] = text
+            return f"{self.prefix}air_delay"
         self.numbers["wavelength"] = 532e-9
         return self.add("laser", media.mendes_pavlis if model == "mendes-pavlis" else media.marini_murray) + "_delay"
 
