@@ -102,10 +102,11 @@ def test_half_a_day_of_geos_3(data_dir, tmp_path):
     bias = 'bias = { range = 80.0, azimuth = "0.0081 deg", elevation = "0.0045 deg" }\n'
     (tmp_path / "kaena.toml").write_text(f"[[stations]]\n{place}{bias}")
     guess = "x=5975.2904km y=2568.6400km z=3120.5845km vx=3.983846km/s vy=-2.071159km/s vz=-5.917095km/s"
-    common = dict(
-        repair="exponent", stations=[tmp_path / "kaena.toml"], guess=f"{guess} epoch=1995-01-29T02:38:37Z frame=EME2000",
-        epoch="1995-01-29T02:38:37 UTC", frame="EME2000",
-    )  # fmt: skip
+    common = {
+        "repair": "exponent", "stations": [tmp_path / "kaena.toml"],
+        "guess": f"{guess} epoch=1995-01-29T02:38:37Z frame=EME2000",
+        "epoch": "1995-01-29T02:38:37 UTC", "frame": "EME2000",
+    }  # fmt: skip
     book = pz.determine(tmp_path / "half.obs", sigma=["range=92.5m", "azimuth=0.0224deg", "elevation=0.0139deg"], **common)
     assert ranges_left(book) < 60.0
     biases = "bias.range.932/pass=92.5m bias.azimuth.932/pass=0.0224deg bias.elevation.932/pass=0.0139deg"
