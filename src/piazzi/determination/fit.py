@@ -43,7 +43,7 @@ def _in_seconds(text: str) -> str:
     match = _WINDOW.fullmatch(text)
     if match is None:
         return text
-    return f"window:{seconds(match[1] + match[2], 'window'):g}s{match[3] or ''}{match[4] or ''}"
+    return f"window:{seconds(match[1] + match[2], 'window'):.12g}s{match[3] or ''}{match[4] or ''}"
 
 
 def estimate(given: Setup, estimator: Estimator, keep: Array) -> Estimate:
