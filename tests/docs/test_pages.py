@@ -25,7 +25,7 @@ finally:
 PAGES = sorted(p for p in DOCS.rglob("*.md") if any(b.language in ("python", "console") for b in blocks.blocks(p.read_text())))
 
 
-SLOW = {"sensors"}  # kernels of half a minute
+SLOW = {"sensors", "ceres"}  # kernels of half a minute
 
 
 @pytest.mark.parametrize("page", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in SLOW)) for p in PAGES])
