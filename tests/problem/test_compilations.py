@@ -140,6 +140,13 @@ def test_an_edit_of_a_force_compiles_the_motion_once_for_all_estimators_and_noth
     assert compiled(edited(OWN.replace("7e6", "6.9e6"), sensor="fix"), ekf) == ["innovate"]  # another sensor, the same motion
 
 
+@pytest.mark.parametrize("lanes", [1, 8])
+def test_sigma_points_are_moved_by_a_unit_in_any_number_of_lanes(lanes, monkeypatch):
+    monkeypatch.setattr("piazzi.estimate.root.machine_lanes", lambda: lanes)
+    calls = pz.UnscentedKalmanFilter().root(problem()).spec(problem()).parts("compiled")[1]
+    assert calls == ["advance", "measure_into", "innovate", "propagate_lanes"]
+
+
 def _field():
     """A field of another name and radius."""
     from piazzi.earth.fields import gravity_field

@@ -144,18 +144,21 @@ def advance(t, dt, count, x, p, Q, scale):
 """
 
 
-def algebra_source(model: Model, apart: Apart, lanes: int, common: str) -> str:
-    """What an estimator's kernel has of a model whose motion is apart; `common` are its sizes and functions of rows."""
-    calls = "".join(calling_source(name, model.n) for name in UNITS if _is_called(name, apart, lanes))
+def algebra_source(model: Model, apart: Apart, together: bool, common: str) -> str:
+    """What an estimator's kernel has of a model whose motion is apart; `common` are its sizes and functions of rows.
+
+    `together` if it moves states in lanes, be it in one.
+    """
+    calls = "".join(calling_source(name, model.n) for name in UNITS if _is_called(name, apart, together))
     return common + axes_source(model) + calls + (ADVANCE if apart.axes else "")
 
 
-def called_units(reached: Iterable[str], apart: Apart, lanes: int) -> list[str]:
+def called_units(reached: Iterable[str], apart: Apart, together: bool) -> list[str]:
     """The units among the functions that a module's entries reach."""
     found = set(reached)
-    return [name for name in UNITS if name in found and _is_called(name, apart, lanes)]
+    return [name for name in UNITS if name in found and _is_called(name, apart, together)]
 
 
-def _is_called(name: str, apart: Apart, lanes: int) -> bool:
+def _is_called(name: str, apart: Apart, together: bool) -> bool:
     unit = UNITS[name]
-    return (lanes > 1 or not unit.lanes) and (unit.part != "noise" or bool(apart.noise and not apart.axes))
+    return (together or not unit.lanes) and (unit.part != "noise" or bool(apart.noise and not apart.axes))

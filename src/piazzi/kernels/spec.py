@@ -97,13 +97,18 @@ class KernelSpec:
         text = model + "\n\n".join(own.values())
         bundles, functions = definitions(text), _definitions(text)
         reached = check_names({"bundles": bundles, "functions": functions, "model": model, **own})
-        units = called_units(reached, self.apart, lanes) if self.apart is not None and backend == "compiled" else []
+        units = called_units(reached, self.apart, self._together) if self.apart is not None and backend == "compiled" else []
         return head + bundles + functions + text, units
 
     def _algebra(self, lanes: int) -> str:
         """What stands for the model in a kernel that calls its motion and its measurements."""
         assert self.apart is not None
-        return algebra_source(self.model, self.apart, lanes, sizes_source(self.model, lanes) + ROWS)
+        return algebra_source(self.model, self.apart, self._together, sizes_source(self.model, lanes) + ROWS)
+
+    @property
+    def _together(self) -> bool:
+        """Whether states are moved in lanes, of which there may be one."""
+        return "step_lanes" in self.fragments
 
     def module_of(self, unit: str) -> KernelSpec:
         """The module of a unit that this one calls, shared with all others that do."""
