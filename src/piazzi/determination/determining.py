@@ -20,6 +20,7 @@ from piazzi.determination.case_file import split
 from piazzi.determination.common import with_common_errors
 from piazzi.determination.earlier import Earlier, earlier_of, fresh
 from piazzi.determination.editing import edited
+from piazzi.determination.faults import Faults, named
 from piazzi.determination.fit import begun, estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
 from piazzi.determination.holding import Held, held, unasked
@@ -235,11 +236,19 @@ def solved(
     seconds = time.perf_counter() - started
     announce("testing")
     case = Case() if case is None else case
+    faults = _faults(given, found[answer], analysis, keep, reasons)
     unseen = _unseen(given, chosen[answer], found[answer], analysis, keep, case.hold)
-    sentences = verdict(given, answer, found, analysis, keep, reasons, unseen)
+    sentences = verdict(given, answer, found, analysis, keep, faults, unseen)
     return Determination(
-        given, answer, found, keep, reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}), case, unseen
+        given, answer, found, keep, faults.reasons, analysis, sentences, scale, frame, seconds, dict(notes or {}), case, unseen
     )
+
+
+def _faults(given: Setup, answer: Estimate, analysis: Analysis | None, keep: Array, reasons: Array) -> Faults:
+    """Why rows are not used, looked into where an orbit without process noise says it."""
+    if analysis is None or answer.view != "delayed" or not given.problem.is_noise_free or (reasons == "").all():
+        return Faults(reasons, ())
+    return named(given, answer.mean, keep, reasons)
 
 
 def _unseen(

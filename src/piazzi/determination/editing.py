@@ -11,6 +11,8 @@ from math import exp
 import numpy as np
 
 from piazzi.determination.analysis import Analysis
+from piazzi.determination.faults import DUPLICATE, OUTLIER, STATION
+from piazzi.determination.holding import labels_of, passes
 from piazzi.determination.setup import Setup, scale_of
 from piazzi.estimate.chi_square import quantile
 from piazzi.problem.checks import Array
@@ -20,7 +22,7 @@ SPARE = 8  # values beyond the unknowns, below which nothing is left out
 ROUNDS = 20
 MOST = 0.2  # of the rows: so many are not left out
 FLOOR = 1e-6  # of a variance: a row that alone determines something has no residual
-OUTLIER, STATION, DUPLICATE = "outlier", "wrong station", "duplicate"
+FEW = 1.0 / 3.0  # of the passes: so many may be left out as a whole
 
 
 def edited(given: Setup, analysis: Analysis, keep: Array | None = None) -> tuple[Array, Array]:
@@ -38,8 +40,7 @@ def edited(given: Setup, analysis: Analysis, keep: Array | None = None) -> tuple
     keep = ~repeated if keep is None else keep & ~repeated
     if given.problem.is_noise_free and there[keep].sum() >= given.problem.model.n + SPARE:
         keep = _settled(given, analysis, keep, repeated, there)
-    which = given.tracking.stations_of(given.problem)
-    labels = np.array([given.measured.labels[s.name] for s in given.problem.stations], dtype=object)[which]
+    labels = labels_of(given)
     reasons[some & ~keep] = OUTLIER
     for label in dict.fromkeys(labels[some & ~keep].tolist()):
         own = (labels == label) & some & ~repeated
@@ -47,7 +48,12 @@ def edited(given: Setup, analysis: Analysis, keep: Array | None = None) -> tuple
             reasons[own] = STATION
     reasons[repeated] = DUPLICATE
     odd = reasons == OUTLIER
-    if odd.sum() > MOST * some.sum():  # so many are no outliers: the model does not hold, and the verdict says so
+    every = passes(given, some & ~repeated)
+    whole = [rows for rows in every if len(rows) > 1 and odd[rows].all()]
+    single = odd.copy()
+    if len(whole) <= FEW * len(every):  # a pass is one mistake, not as many as it has rows
+        single[[row for rows in whole for row in rows]] = False
+    if single.sum() > MOST * some.sum():  # so many are no outliers: the model does not hold, and the verdict says so
         keep = keep | odd
         reasons[odd] = ""
     return keep, reasons

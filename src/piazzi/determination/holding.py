@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from piazzi.determination.analysis import Analysis, analysed
 from piazzi.determination.fit import estimate
 from piazzi.determination.ranging import GAP
 from piazzi.determination.setup import Setup, follow, scale_of
+from piazzi.earth.stepping import turning
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate, Estimator
 from piazzi.evaluate.information import singular
@@ -104,6 +106,7 @@ def passes(given: Setup, keep: Array) -> list[Array]:
     """
     labels = labels_of(given)
     t, rows = given.tracking.row_times, given.rows
+    gap = min(GAP, pi / turning(given.states[0, :3], given.states[0, 3:6])) if given.measured.about == "earth" else GAP
     segment = np.where(rows.max(axis=1) >= 0, given.measured.observations.segment[rows.max(axis=1)], -1)
     there = keep & np.isfinite(given.tracking.values).any(axis=1)
     found: list[Array] = []
@@ -111,7 +114,7 @@ def passes(given: Setup, keep: Array) -> list[Array]:
         own = np.flatnonzero((labels == label) & there)
         last = {s: t[own[segment[own] == s][-1]] for s in np.unique(segment[own]).tolist()}
         until = np.maximum.accumulate([last[s] for s in segment[own].tolist()])  # of the blocks so far
-        found += np.split(own, np.flatnonzero((np.diff(t[own]) > GAP) | (t[own[1:]] > until[:-1])) + 1)
+        found += np.split(own, np.flatnonzero((np.diff(t[own]) > gap) | (t[own[1:]] > until[:-1])) + 1)
     return sorted(found, key=lambda rows: float(t[rows[0]]))
 
 
@@ -181,12 +184,12 @@ def _by_steps(given: Setup, answer: Estimate, analysis: Analysis, rest: Array, r
     off = here.whitened[rows] - own @ step
     H = np.linalg.solve(root.T, own.reshape(-1, len(unit)).T).T
     there = np.isfinite(off).reshape(-1)
-    S = np.eye(there.sum()) + H[there] @ H[there].T
-    lower = np.linalg.cholesky(S)
-    flat = off.reshape(-1)[there]
-    squares = float(np.sum(np.linalg.solve(lower, flat) ** 2))
+    H, flat = H[there], off.reshape(-1)[there]
+    # of S = I + H H^T of all rows: nu^T S^-1 nu by the factor of I + H^T H, which has but the size of the state
+    shared = np.asarray(np.linalg.qr(np.vstack([np.eye(len(unit)), H]), mode="r"))
+    squares = float(flat @ flat - np.sum(np.linalg.solve(shared.T, H.T @ flat) ** 2))
     inside = np.full(off.size, np.nan)
-    inside[there] = flat**2 <= quantile(WITHIN, 1) * np.diag(S)
+    inside[there] = flat**2 <= quantile(WITHIN, 1) * (1.0 + np.sum(H**2, axis=1))
     sigma = _sigma(given, rows)
     return _told(given, rows, off * sigma, squares, int(there.sum()), inside.reshape(off.shape))
 
@@ -208,7 +211,7 @@ def _by_estimator(given: Setup, estimator: Estimator, answer: Estimate, rest: Ar
         z, h = tracking.values[rows[own]][:, :m], problem.measure(name, x, t)
         apart = np.full((len(own), off.shape[1]), np.nan)
         apart[:, :m] = z - h
-        nu, size = wrapped(problem, which[own], apart)[:, :m], _on_sky(problem, s, h)
+        nu, size = wrapped(problem, which[own], apart)[:, :m], on_sky(problem, int(s), h)
         nu, H = nu * size, problem.measurement_jacobian(name, x, t) * size[..., None]
         S = H @ P @ np.swapaxes(H, 1, 2) + problem.station_noise[s][:m, :m]
         off[own, :m] = nu
@@ -219,7 +222,7 @@ def _by_estimator(given: Setup, estimator: Estimator, answer: Estimate, rest: Ar
     return _told(given, rows, off, squares, int(np.isfinite(off).sum()), inside)
 
 
-def _on_sky(problem: Any, s: int, h: Array) -> Array:
+def on_sky(problem: Any, s: int, h: Array) -> Array:
     """Factors (K, m) of components: the cosine of the partner of an angle that is measured on the sky."""
     sensor = problem.model.sensor(problem.stations[s].sensor)
     out = np.ones_like(h)

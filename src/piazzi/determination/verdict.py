@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from piazzi.determination.analysis import Analysis
 from piazzi.determination.common import together
-from piazzi.determination.editing import STATION
-from piazzi.determination.holding import GOOD, Held
+from piazzi.determination.completeness import truncated
+from piazzi.determination.faults import STATION, Faults
+from piazzi.determination.holding import GOOD, Held, labels_of
 from piazzi.determination.physical import physical
 from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.chi_square import quantile
@@ -57,7 +58,7 @@ def verdict(
     estimates: Mapping[str, Estimate],
     analysis: Analysis | None,
     keep: Array,
-    reasons: Array,
+    faults: Faults,
     held: Held | None = None,
 ) -> dict[str, Sentence]:
     """The six of an answer, that of the first estimate; `held` is what became of rows that were held back."""
@@ -69,9 +70,9 @@ def verdict(
                 seen(given, analysis, keep),
                 alone(given),
                 converged(given, answer, analysis, keep),
-                physical(given, answer, unseen(honest(given, analysis, keep, reasons), held)),
+                physical(given, answer, unseen(honest(given, analysis, keep, faults), held)),
                 agreed(given, name, estimates),
-                Sentence(None, None, "none yet", "Complete: what the forces leave out is not weighed against sigma yet."),
+                complete(given, answer, analysis, keep),
             ),
             strict=True,
         )
@@ -158,12 +159,20 @@ def converged(given: Setup, answer: Estimate, analysis: Analysis | None, keep: A
     )
 
 
-def honest(given: Setup, analysis: Analysis | None, keep: Array, reasons: Array) -> Sentence:
-    """Whether residuals are as large as their sigmas say."""
+def honest(given: Setup, analysis: Analysis | None, keep: Array, faults: Faults) -> Sentence:
+    """Whether residuals are as large as their sigmas say; what is known of passes that were left out is said."""
+    fitted = _fitted(given, analysis, keep, faults.reasons)
+    more = f" Left out: {'; '.join(faults.said)}." if faults.said else ""
+    return replace(fitted, sentence=fitted.sentence + more)
+
+
+def _fitted(given: Setup, analysis: Analysis | None, keep: Array, reasons: Array) -> Sentence:
     test = f"sum of squared residuals in sigma against chi-square at {SURE:.1%}"
     if analysis is None:
         return Sentence(None, None, test, "Honest: there are no residuals to judge by.")
-    wrong = sorted({given.measured.labels[given.tracking.row_stations[i]] for i in np.flatnonzero(reasons == STATION)})
+    labels, there = labels_of(given), np.isfinite(given.tracking.values).any(axis=1)
+    left = dict.fromkeys(labels[reasons == STATION].tolist())
+    wrong = sorted(label for label in left if (reasons[(labels == label) & there] == STATION).all())
     if wrong:
         names = ", ".join(wrong)
         return Sentence(False, None, test, f"Not honest: all measurements of {names} contradict those of the others.")
@@ -207,8 +216,24 @@ def unseen(fitted: Sentence, held: Held | None) -> Sentence:
     test = f"{fitted.test}; predictions of rows left out, up to {GOOD:g} times their covariances"
     if held.honest or fitted.ok is False:
         figure = fitted.figure if held.honest else max(fitted.figure or 0.0, float(np.sqrt(held.nees)))
-        return Sentence(fitted.ok, figure, test, f"{fitted.sentence.removesuffix('.')}; {found}.")
+        return Sentence(fitted.ok, figure, test, f"{fitted.sentence} {found[0].upper()}{found[1:]}.")
     return Sentence(False, float(np.sqrt(held.nees)), test, f"Not honest: {found}.")
+
+
+def complete(given: Setup, answer: Estimate, analysis: Analysis | None, keep: Array) -> Sentence:
+    """Whether a field of twice the degree would move the orbit."""
+    test = "largest change of a state of the solution in sigma, in a gravity field of twice the degree, up to 1"
+    none = Sentence(None, None, test, "Complete: what the forces leave out is not weighed against sigma here.")
+    if analysis is None or answer.view != "delayed" or not answer.success:
+        return none
+    found = truncated(given, answer.mean, analysis, keep)
+    if found is None:
+        return none
+    degree, more, moved = found
+    had = f"degree {degree}" if degree > 1 else "the Earth as a point"
+    text = f"gravity to degree {more} instead of {had} moves the solution by {number(moved, 2)} sigma"
+    others = "; other forces that are left out are not weighed" if moved <= 1.0 else ""
+    return Sentence(moved <= 1.0, moved, test, f"{'Complete' if moved <= 1.0 else 'Not complete'}: {text}{others}.")
 
 
 def agreed(given: Setup, name: str, estimates: Mapping[str, Estimate]) -> Sentence:
