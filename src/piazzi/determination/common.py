@@ -36,8 +36,11 @@ def with_common_errors(given: Setup) -> Setup:
     if said or not laser.any() or not np.isfinite(given.states).all():
         return given
     score = together(given, analysed(given, given.states), laser)
-    if score is None or score[0] <= quantile(SURE, score[1]):
-        return given
+    return given if score is None or score[0] <= quantile(SURE, score[1]) else with_pass_biases(given)
+
+
+def with_pass_biases(given: Setup) -> Setup:
+    """The set-up with a bias of ranges for each pass; its prior and states are otherwise as they were."""
     seen = with_instruments(given.measured, [Asked(Estimated("bias.range", PASS, LASER), "estimated", "--estimate")])
     problem = replace(
         posed(seen, given.chosen, given.guess),
