@@ -168,3 +168,11 @@ def test_a_prior_that_is_later_than_the_file_begins_is_propagated_back(files):
     problem, tracking = recorded(files / "one.oem", files / "s.toml", Recording())
     assert problem.prior_time == tracking.times[0] == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(problem.prior.mean, np.concatenate(pz.propagate_kepler(R, V, GM, 0.0)), rtol=1e-8)
+
+
+def test_stations_of_a_file_have_its_epoch(files, data_dir):
+    """Where a station stands is a table of the time past the file's epoch: another one would turn the Earth."""
+    prior = f"[prior]\nmean = {[*R.tolist(), *V.tolist()]}\nsigma = 1.0\n"
+    (files / "s.toml").write_text('epoch = "2016-02-11T00:00:00 UTC"\n' + SCENARIO + prior)
+    with pytest.raises(ValueError, match="leave out the scenario's epoch"):
+        recorded(data_dir / "earth/lageos2/lageos2_20160214.npt", files / "s.toml", Recording(stations=("ilrs",)))

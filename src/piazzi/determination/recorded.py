@@ -164,6 +164,7 @@ def _measuring(problem: Problem, found: Measured) -> Problem:
 
 def _dated(found: Measured, problem: Problem) -> Mapping[str, Any]:
     """The data of sensors; they are of the epoch that times of the file are past."""
-    if found.functions and found.epoch != problem.epoch:
+    placed = any(station.place is not None for station in found.stations)
+    if (found.functions or placed) and found.epoch != problem.epoch:
         raise ValueError(f"times of these sensors are past {found.epoch.exact()}: leave out the scenario's epoch")
     return found.functions
