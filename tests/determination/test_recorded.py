@@ -172,7 +172,7 @@ def test_a_prior_that_is_later_than_the_file_begins_is_propagated_back(files):
 
 def test_stations_of_a_file_have_its_epoch(files, data_dir):
     """Where a station stands is a table of the time past the file's epoch: another one would turn the Earth."""
-    prior = f"[prior]\nmean = {[*R.tolist(), *V.tolist()]}\nsigma = 1.0\n"
+    prior = f"[prior]\nmean = {[*R.tolist(), *V.tolist()]}\nsigma = {[1.0] * 6}\n"
     (files / "s.toml").write_text('epoch = "2016-02-11T00:00:00 UTC"\n' + SCENARIO + prior)
     with pytest.raises(ValueError, match="leave out the scenario's epoch"):
         recorded(data_dir / "earth/lageos2/lageos2_20160214.npt", files / "s.toml", Recording(stations=("ilrs",)))
