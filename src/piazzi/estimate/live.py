@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from piazzi import kernels
+from piazzi.estimate.lost_root import has_roots
 from piazzi.estimate.saved import Saved
 from piazzi.estimate.session import Session
 from piazzi.estimate.width import too_wide_message
@@ -128,6 +129,7 @@ class LiveFilter(Session):
 
     def __init__(self, problem: Problem, fragments: tuple[str, ...]) -> None:
         self.problem, self._settings = problem, (fragments,)
+        self._has_roots = has_roots(problem.model)
         self._clock = Clock(problem)
         self._stations = {s.name: i for i, s in enumerate(problem.stations)}
         n, m = problem.model.n, problem.model.width

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from piazzi.estimate.live import Clock, checked_measurement, clock_times
+from piazzi.estimate.lost_root import has_roots
 from piazzi.estimate.root import Results, Root, RootKernel
 from piazzi.estimate.saved import Saved
 from piazzi.estimate.session import Session
@@ -59,6 +60,7 @@ class LiveRootFilter(Session):
 
     def __init__(self, problem: Problem, root: Root) -> None:
         self.problem, self._settings = problem, (root,)
+        self._has_roots = has_roots(problem.model)
         self._kernel, self._clock = root.kernel(problem), Clock(problem)
         self._stations = {s.name: i for i, s in enumerate(problem.stations)}
         m = problem.model.width

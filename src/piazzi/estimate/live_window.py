@@ -11,6 +11,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.live import Clock, checked_measurement
 from piazzi.estimate.losses import Loss
+from piazzi.estimate.lost_root import has_roots
 from piazzi.estimate.robust_window import loss_numbers, window_fragments
 from piazzi.estimate.saved import MOST_STEPS, Saved, check_order, check_steps
 from piazzi.estimate.session import Session
@@ -60,6 +61,7 @@ class LiveWindow(Session):
     ) -> None:
         self.problem, self.lag, self.lag_seconds, self.iterations = problem, lag, lag_seconds, iterations
         self._loss, self._settings = loss, (lag, lag_seconds, iterations, loss)
+        self._has_roots = has_roots(problem.model)
         self._clock = Clock(problem)
         self._stations = {s.name: i for i, s in enumerate(problem.stations)}
         fragments = window_fragments(problem, loss, "window_live", "predict")

@@ -5,13 +5,12 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from functools import cached_property
 from math import isfinite
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from piazzi.estimate.lost_root import has_roots, lost_root_of
+from piazzi.estimate.lost_root import lost_root_of
 from piazzi.estimate.soundness import defect
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -31,6 +30,7 @@ class Session(ABC):
     # What copies have and checkpoints need not: nothing to come depends on it
     _shown: ClassVar[tuple[str, ...]] = ("innovation", "innovation_covariance", "_lost")
     mean: Array
+    _has_roots: bool  # set with the others: an attribute that comes later makes all of them slower
     _lost = ""  # the first root that was not found
 
     @property
@@ -45,10 +45,6 @@ class Session(ABC):
     @abstractmethod
     def _foretold(self, t: float) -> Array:
         """The state (n,) about which a measurement at `t`, the last one, was linearised."""
-
-    @cached_property
-    def _has_roots(self) -> bool:
-        return has_roots(self.problem.model)
 
     def _look_for_root(self, s: int, t: float) -> None:
         """After a measurement of station `s`: note what is lost, the first time that the belief is no number."""

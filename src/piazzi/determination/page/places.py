@@ -60,8 +60,8 @@ def station_rows(found: Any, path: Sampled | None) -> list[Rows]:
     out = []
     for n, name in enumerate(names):
         own = np.flatnonzero(columns["station"] == name)
-        own = own[np.unique(inverse[own], return_index=True)[1]]  # one of the components of a time
-        at = inverse[own]
+        at, which = np.unique(inverse[own], return_inverse=True)
+        used, reasons = _together(columns, own, which, len(at))
         site = sites[name].position(epochs[int(at[0])]) if name in sites else None
         look = (None, None) if site is None else azimuth_elevation_range(site, place[at])[:2]
         gaps = np.flatnonzero(np.diff(times[at]) > GAP) + 1
@@ -69,15 +69,24 @@ def station_rows(found: Any, path: Sampled | None) -> list[Rows]:
         def apart(values: Any, gaps: Array = gaps) -> Any:
             return None if values is None else np.insert(np.asarray(values, dtype=float), gaps, np.nan, axis=0)
 
-        notes = np.insert(columns["reason"][own].astype(object), gaps, "").tolist()
+        notes = np.insert(reasons, gaps, "").tolist()
         when = np.insert(times[at], gaps, times[at][gaps - 1] if len(gaps) else [])
         out.append(
             Rows(
-                name, station_colour(n), when, apart(place[at]), apart(turned[at]), apart(columns["used"][own]), notes, site,
+                name, station_colour(n), when, apart(place[at]), apart(turned[at]), apart(used), notes, site,
                 apart(look[0]), apart(look[1]),
             )
         )  # fmt: skip
     return out
+
+
+def _together(columns: dict[str, Array], own: Array, which: Array, count: int) -> tuple[Array, Array]:
+    """Whether all components of a time were used, and why one was not, at so many times."""
+    used, reasons = np.ones(count, dtype=bool), np.full(count, "", dtype=object)
+    left = ~columns["used"][own].astype(bool)
+    used[which[left]] = False
+    reasons[which[left]] = columns["reason"][own[left]]
+    return used, reasons
 
 
 def _positions(found: Any, times: Array) -> Array:
