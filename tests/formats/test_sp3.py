@@ -145,6 +145,7 @@ def test_satellites_of_version_a_have_numbers(tmp_path):
         ("/* comment", "?? comment", "line 8: no line begins with"),
         ("#dV2015", "#eV2015", "no format that is known"),
         ("++         6", "++         x", "line 4: accuracy code"),
+        ("%f  1.2500000", "%f  9999.0000", r"line 14: a standard deviation of 9999\*\*18 mm is no length"),
     ],
 )
 def test_each_mistake_has_one_line(tmp_path, old, new, what):

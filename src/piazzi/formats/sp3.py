@@ -22,6 +22,7 @@ _SCALES |= {"UTC": ("UTC", 0.0), "GLO": ("UTC", 0.0), "TAI": ("TAI", 0.0), "ccc"
 _FIXED = re.compile(r"(ITR|IGS|IGb|IGR|SLR|ECF|ECEF|WGS|PZ|GTR|CGC|BTR|NTR|U)", re.IGNORECASE)
 _SPACE_FIXED = {"GCRF": "GCRF", "ICRF": "GCRF", "J2000": "EME2000", "EME00": "EME2000", "EME20": "EME2000"}
 _NOTHING = 999999.0  # what stands where there is no value, in the unit of the file
+MOST_DIGITS = 15  # of a standard deviation in mm
 _FLAGS = ((74, "E", "clock event"), (75, "P", "predicted clock"), (78, "M", "manoeuvre"), (79, "P", "predicted"))
 
 
@@ -189,7 +190,10 @@ def _clock(text: str, unit: float) -> float:
 def _deviation(file: _File, name: str, cell: str) -> float:
     """Standard deviation of a coordinate in m: by its own exponent, else by the satellite's code; NaN for neither."""
     if cell and file.base > 0.0:
-        return float(1e-3 * file.base ** integer(cell, "exponent of a standard deviation"))
+        power = integer(cell, "exponent of a standard deviation")
+        if abs(power * math.log10(file.base)) > MOST_DIGITS:
+            raise ValueError(f"a standard deviation of {file.base:g}**{power} mm is no length")
+        return float(1e-3 * file.base**power)
     code = file.codes[file.names.index(name)] if name in file.names[: len(file.codes)] else 0
     return 1e-3 * 2.0**code if 0 < code < 60 else math.nan
 
