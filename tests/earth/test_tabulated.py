@@ -105,3 +105,15 @@ def test_frames_and_bodies_that_are_none_are_refused():
         earth.Rotation("GCRX", "ITRF", EPOCH)
     with pytest.raises(ValueError, match="body 'son' is not known; did you mean 'sun'"):
         earth.Body("son", EPOCH)
+
+
+def test_both_directions_of_a_rotation_share_their_days():
+    from piazzi.earth.tabulated import _day
+
+    epoch = pz.Epoch("2011-05-03T04:05:06 UTC")
+    there, back = earth.Rotation("GCRF", "ITRF", epoch), earth.Rotation("ITRF", "GCRF", epoch)
+    _day.cache_clear()
+    there.block(0.0, 3e5)
+    made = _day.cache_info().misses
+    np.testing.assert_array_equal(back.block(0.0, 3e5), there.block(0.0, 3e5))
+    assert _day.cache_info().misses == made > 3

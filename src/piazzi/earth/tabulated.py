@@ -29,6 +29,9 @@ from piazzi.outside.pieces import Pieces, fitted
 
 Array = np.ndarray[Any, Any]
 DAY = scales.DAY
+DAYS = (
+    8192  # that are kept, of all tables: years of a problem with a few, at most 10 kB each; fewer, and none would be met again
+)
 _UTC_FROM = -1262304000.0  # s past J2000.0: 1960; before it days begin at 0h TT
 
 
@@ -61,11 +64,16 @@ class Tabulated:
         """Known at any time."""
         return
 
+    @property
+    def table(self) -> Any:
+        """The recipe that has the same table, of all that do."""
+        return self
+
     def pieces(self, first: float, last: float) -> Pieces:
         """The polynomials from the day of `first` to that of `last` (s)."""
         midnight = -sum(_of_day(self.epoch))
         a, b = (floor((t - midnight) / DAY) for t in (first, last))
-        coefficients = np.concatenate([_day(self, k) for k in range(a, b + 1)])
+        coefficients = np.concatenate([_day(self.table, k) for k in range(a, b + 1)])
         zero = np.zeros(coefficients.shape[2])
         return Pieces(midnight + a * DAY, self.LENGTH, coefficients, zero, zero)
 
@@ -94,7 +102,7 @@ def _of_day(epoch: Epoch) -> tuple[float, float]:
     return seconds, fraction
 
 
-@lru_cache(maxsize=2048)
+@lru_cache(maxsize=DAYS)
 def _day(recipe: _Daily, number: int) -> Array:
     """Coefficients of all pieces of one day, counted from that of the epoch."""
     seconds, fraction = _of_day(recipe.epoch)
@@ -136,6 +144,11 @@ class Rotation(Tabulated):
         """The frames in the order of the table."""
         first, last = sorted((self.from_, self.to), key=FRAMES.index)
         return first, last
+
+    @cached_property
+    def table(self) -> Rotation:
+        """That from the first of both frames to the second."""
+        return self if (self.from_, self.to) == self.frames else Rotation(*self.frames, self.epoch, self.eop)
 
     @cached_property
     def signature(self) -> Signature:
