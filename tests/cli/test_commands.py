@@ -131,11 +131,11 @@ def test_demo_writes_what_it_says(call, tmp_path):
         "orbit.png",
         "tracking.csv",
     ]
-    assert made == [f"{p}/{k}" for p in ("b612-range", "satellite-bearing") for k in kinds]
-    assert "Wrote 15 files" in result.out
+    assert made == [f"{p}/{k}" for p in ("b612-range", "gps-position", "satellite-bearing") for k in kinds]
+    assert "Wrote 22 files" in result.out
     assert f"Open {tmp_path / 'demo' / 'report.html'} in a browser" in result.out
     assert (tmp_path / "demo" / "report.html").read_text().startswith("<!DOCTYPE html>")
-    for name in ("b612-range", "satellite-bearing"):
+    for name in ("b612-range", "gps-position", "satellite-bearing"):
         document = json.loads((tmp_path / "demo" / name / "comparison.json").read_text())
         assert document["schema"] == "piazzi.compare/1"
         assert all(row["success"] for row in document["rows"])

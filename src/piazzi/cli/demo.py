@@ -1,4 +1,4 @@
-"""``piazzi demo``: both founding problems simulated, estimated and drawn."""
+"""``piazzi demo``: both founding problems and an orbit about the Earth, simulated, estimated and drawn."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from piazzi.evaluate import Comparison
     from piazzi.scenarios import Scenario
 
-PROBLEMS = ("satellite-bearing", "b612-range")
+PROBLEMS = ("satellite-bearing", "b612-range", "gps-position")
 PICTURES = 5
 KINDS = ("png", "pdf", "svg")
 
@@ -28,9 +28,10 @@ KINDS = ("png", "pdf", "svg")
 @click.option("--format", "kind", type=click.Choice(KINDS), default=KINDS[0], show_default=True, help="Format of the pictures.")
 @options.seed
 def command(folder: str, kind: str, seed: int) -> int:
-    """Simulate and estimate two problems, with pictures.
+    """Simulate and estimate three problems, with pictures.
 
-    satellite-bearing is a satellite seen only by its bearing; b612-range a probe around a tiny planet seen only by its range.
+    satellite-bearing is a satellite seen only by its bearing; b612-range a probe around a tiny planet seen only by its range;
+    gps-position a satellite about the real Earth that measures its own position.
 
     Examples:
       piazzi demo
@@ -112,7 +113,7 @@ def _print_next_steps(wrote: list[Path], folder: Path) -> None:
     kept = folder / PROBLEMS[1] / "tracking.csv"
     lines += [
         "",
-        f"Open {folder / 'report.html'} in a browser: both problems on one page, to point at and to play.",
+        f"Open {folder / 'report.html'} in a browser: all three problems on one page, to point at and to play.",
         "",
         "Next:",
     ]
