@@ -44,7 +44,10 @@ def first_look(seen: Measured) -> Guess:
         return _nominal(seen)
     if not search.modes:
         raise ValueError(_nothing(len(kept)))
-    best = search.modes[0].state
+    above = [mode for mode in search.modes if mode.admissible]
+    if not above:  # orbits through the Earth only: forces of any other will do, to find out the same
+        return _nominal(seen)
+    best = above[0].state
     return Guess(seen.epoch + search.epoch, best[:3], best[3:], "initial orbits")
 
 
