@@ -142,7 +142,7 @@ def test_what_is_applied_already_is_not_applied_again():
     ("change", "says"),
     [
         ({"way": None}, "--range two-way"),
-        ({"way": "three-way"}, "three-way ranges are not determined from yet"),
+        ({"way": "three-way"}, "the file does not say which station sent the three-way signals"),
         ({"range_is": None}, "--range round-trip"),
         ({"mode": "single_diff"}, "differences of ranges"),
     ],

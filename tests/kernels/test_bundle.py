@@ -228,7 +228,7 @@ def test_sizes_are_said_beside_the_entry():
     ):
         entry(*good[:2], good[2][:2], *good[3:])
     with pytest.raises(ValueError, match="kernel entry 'go' has no argument 'y' to be of size 'K'"):
-        signatures(text.replace("t=", "y=").replace("D+1", "K"))
+        signatures(text.replace("(K=", "(y="))
 
 
 def test_every_array_that_an_entry_of_the_package_takes_has_a_size():
