@@ -46,9 +46,11 @@ class Root:
         """The module of a problem's filter."""
         points = self.fragment == "root_unscented"
         together = points and problem.moves_in_lanes
+        # what is compiled apart is called with lanes; a whole program has the motion of one state in lanes, rounded alike
+        moved = "step_lanes" if together and problem.model.reads_data else "step_alone"
         parts = (
             "transition",
-            *(("step_lanes" if together else "step_alone",) if points else ()),
+            *((moved,) if points else ()),
             problem.noise_fragment,
             "epoch_guarded",
             "semidefinite",
