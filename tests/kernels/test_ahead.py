@@ -42,7 +42,7 @@ def test_what_is_missing_is_compiled_by_others_with_progress(specs, caplog):
 
 
 def test_few_modules_or_one_processor_begin_no_process(specs, monkeypatch):
-    monkeypatch.setattr(ahead, "_started", None)
+    monkeypatch.setattr(ahead, "interpreter", None)
     monkeypatch.setattr(ahead, "ANY", 3)
     assert ahead.compile_ahead(specs) == 0
     monkeypatch.setattr(ahead, "ANY", 2)

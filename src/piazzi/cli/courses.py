@@ -63,12 +63,13 @@ def course_of(text: str, forces: str | None, begin: str | None, chosen: str | No
         raise click.UsageError("ORBIT is empty", click.get_current_context(silent=True))
     if text.lower().endswith(".toml") or (text in names() and not os.path.exists(text)):
         return _of_scenario(text, forces)
+    from piazzi.determination.words import date
     from piazzi.earth.defaults import default_forces, lowest_height, read_forces
     from piazzi.earth.stepping import longest_step
     from piazzi.kernels import RungeKutta8
     from piazzi.orbit.starting import start_of
 
-    start = start_of(text, None if begin is None else _date(begin, "--from"), chosen)
+    start = start_of(text, None if begin is None else date(begin, "--from"), chosen)
     height = lowest_height(start.state[:3], start.state[3:])
     choice = default_forces(height) if forces is None else read_forces(forces, height)
     P = np.zeros((6, 6)) if start.covariance is None else start.covariance
@@ -135,16 +136,9 @@ def _time(problem: Problem, text: str, what: str, since: float) -> float:
     except ValueError:
         if problem.epoch is None:
             raise
-    return float(_date(text, what) - problem.epoch)
+    from piazzi.determination.words import date
 
-
-def _date(text: str, what: str) -> Any:
-    from piazzi.earth import Epoch
-
-    try:
-        return Epoch(text)
-    except ValueError as error:
-        raise ValueError(f"{what}: {error}") from None
+    return float(date(text, what) - problem.epoch)
 
 
 def _duration(text: str, what: str) -> float:

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import isfinite
 from typing import Any
 
 from piazzi.text import one_line
+
+
+@contextmanager
+def _said_at(where: str, kinds: tuple[type[Exception], ...] = (ValueError,)) -> Iterator[None]:
+    """Say where the value was that is refused within, by an error of these kinds."""
+    try:
+        yield
+    except kinds as error:
+        raise ValueError(f"{where}: {error}") from None
 
 
 def anything(value: Any, where: str) -> Any:
@@ -50,10 +61,8 @@ def instant(value: Any, where: str) -> Any:
     """A date: text stays, as its scale is that of the answer."""
     from piazzi.earth import Epoch
 
-    try:
+    with _said_at(where, (TypeError, ValueError)):
         Epoch(value)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{where}: {error}") from None
     return value
 
 
@@ -69,10 +78,8 @@ def estimators(value: Any, where: str) -> Any:
     """Estimators as text, or objects by name."""
     from piazzi.determination.fit import estimators as read
 
-    try:
+    with _said_at(where):
         read(value)
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from None
     return value
 
 
@@ -150,10 +157,8 @@ def hold(value: Any, where: str) -> Any:
     """Rows to hold back, as text or a share."""
     from piazzi.determination.holding import check
 
-    try:
+    with _said_at(where):
         return check(value)
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from None
 
 
 def formats(value: Any, where: str) -> str:

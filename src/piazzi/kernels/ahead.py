@@ -8,9 +8,10 @@ import pickle
 import subprocess
 import sys
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from queue import Empty, SimpleQueue
+from typing import Any
 
 from piazzi.kernels.cache import is_compiled, make, missing
 from piazzi.kernels.folder import private_folder, writable_folder
@@ -81,7 +82,8 @@ class _Crew:
 
     def _feed(self) -> None:
         with suppress(OSError, pickle.PicklingError):
-            process = _started()
+            # in a session of its own: Ctrl-C is for the process in front, which ends this one
+            process = interpreter(PROGRAM, {}, stderr=subprocess.DEVNULL, start_new_session=True)
             self._processes.append(process)
             assert process.stdin is not None
             assert process.stdout is not None
@@ -103,17 +105,18 @@ class _Crew:
         return spec
 
 
-def _started() -> subprocess.Popen[bytes]:
-    """A new interpreter that imports nothing of the caller's program, nor from the working directory."""
+def interpreter(program: str, environment: Mapping[str, str], **options: Any) -> subprocess.Popen[bytes]:
+    """A new interpreter, spoken to through pipes, that imports nothing of the caller's program, nor from the working directory.
+
+    `environment` is added to that of this process; `options` are of `subprocess.Popen`.
+    """
     path = os.pathsep.join(p for p in sys.path if p)
-    environment = {**os.environ, "PYTHONSAFEPATH": "1", "PYTHONPATH": path}
     return subprocess.Popen(
-        [sys.executable, "-P", "-c", PROGRAM],
+        [sys.executable, "-P", "-c", program],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env=environment,
-        start_new_session=True,  # Ctrl-C is for the process in front, which ends this one
+        env={**os.environ, **environment, "PYTHONSAFEPATH": "1", "PYTHONPATH": path},
+        **options,
     )
 
 

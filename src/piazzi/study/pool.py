@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import signal
 import struct
 import subprocess
-import sys
 import threading
 from contextlib import suppress
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import IO, Protocol
 
+from piazzi.kernels.ahead import interpreter
 from piazzi.study.pieces import run_task
 from piazzi.study.plan import Plan
 from piazzi.study.tasks import Piece, Task
@@ -149,10 +148,7 @@ class Processes:
             end(process)
 
     def _start(self) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-P", "-c", "from piazzi.study.worker import main; main()"]
-        environment = {**os.environ, **ENVIRONMENT}
-        environment["PYTHONPATH"] = os.pathsep.join(p for p in sys.path if p)
-        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
+        return interpreter("from piazzi.study.worker import main; main()", ENVIRONMENT)
 
     def _run(self, process: subprocess.Popen[bytes], task: Task) -> Outcome:
         assert process.stdin is not None
