@@ -1,6 +1,7 @@
 """Roots in dynamics, steps and rules; roots that are not found; light time and averaged Doppler against 50 digits."""
 
 import copy
+import dataclasses
 
 import mpmath as mp
 import numpy as np
@@ -138,29 +139,78 @@ def lossy(iterations=4, sensor_root="tau**2 + 1 - x**2", start="1"):
     return pz.Problem(model, pz.Gaussian([2.0], [1e-2]), [1e-6], stations)
 
 
-@pytest.mark.parametrize("estimator", [pz.ExtendedKalmanFilter(), pz.SquareRootKalmanFilter(), pz.Smoother(), pz.FactorGraph()],
-                         ids=lambda e: type(e).__name__)  # fmt: skip
-def test_the_message_names_the_root_and_the_station(estimator):
-    p = lossy(8)
-    times = np.arange(0.0, 3.0, 0.25)
-    stations = [s for _ in times for s in ("ruler", "mast")]
-    values = [[v] for t in times for v in (2 - 0.5 * t, np.sqrt(max((2 - 0.5 * t) ** 2 - 1, 0.25)))]
-    tracking = pz.Tracking(np.repeat(times, 2), values, stations)
-    found = estimator.estimate(p, tracking)
+LOST = "root 'tau' of station 'mast' has no solution at t = "
+SESSIONS = ["ekf", "ekf:joint", "ekf:gate", "srekf", "srekf:gate", "iekf", "iekf:3:gate", "ukf", "ukf:gate"]
+SESSIONS += ["window:5", "window:5x3", "window:5:huber", "window:5:tukey"]
+
+
+def falling():
+    """Time, station and value of what is measured of a state that falls through the root."""
+    for t in np.arange(0.0, 3.0, 0.25):
+        x = 2.0 - 0.5 * float(t)
+        yield float(t), "ruler", x
+        yield float(t), "mast", np.sqrt(max(x**2 - 1.0, 0.25))
+
+
+def check_message(found):
     assert not found.success
-    assert "root 'tau' of station 'mast' has no solution at t = " in found.message and "\n" not in found.message
+    assert found.message.count(LOST) >= 1 and "\n" not in found.message
 
 
-@pytest.mark.parametrize("text", ["ekf", "srekf", "ukf", "window:5"])
+@pytest.mark.parametrize("text", [*SESSIONS, "smoother", "graph", "graph:huber", "graph:tukey", "graph:bank=8", "batch"])
+def test_the_message_of_every_estimator_names_the_root_and_the_station(text, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    times, stations, values = zip(*falling(), strict=True)
+    found = parse(text).estimate(lossy(8), pz.Tracking(times, np.array(values)[:, None], stations))
+    check_message(found)
+    if found.delayed is not None:
+        check_message(found.delayed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", ["ekf", "ekf:gate", "iekf:3:gate", "srekf:gate", "smoother", "graph"])
+def test_so_does_that_of_compiled_ones(text):
+    times, stations, values = zip(*falling(), strict=True)
+    check_message(parse(text).estimate(lossy(8), pz.Tracking(times, np.array(values)[:, None], stations)))
+
+
+@pytest.mark.parametrize("text", SESSIONS)
 def test_a_session_names_them_too(text, monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     live = parse(text).start(lossy(8))
-    for t in np.arange(0.0, 3.0, 0.25):
-        live.update("ruler", 2 - 0.5 * t, t)
-        live.update("mast", np.sqrt(max((2 - 0.5 * t) ** 2 - 1, 0.25)), t)
-    assert not live.success
-    assert "root 'tau' of station 'mast' has no solution at t = " in live.message and "\n" not in live.message
+    for t, station, value in falling():
+        live.update(station, value, t)
+    check_message(live)
     assert copy.copy(live).message == live.message
+
+
+def test_nothing_is_simulated_where_a_root_is_lost(monkeypatch, tmp_path):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    p, times = lossy(8), np.arange(0.0, 3.0, 0.25)
+    with pytest.raises(ValueError, match="nothing can be simulated: root 'tau' of station 'mast' has no solution at t = "):
+        pz.simulate(p, times, np.random.default_rng(0))
+    found = pz.Study(p, times, ["ekf", "smoother"], runs=2).run(tmp_path / "s.nc", workers=1)
+    assert not any(found.row(0, row).success.any() for row in range(len(found.rows)))
+    assert all(LOST in text for *_, text in found.about["messages"])
+    assert pz.simulate(p, times, np.random.default_rng(0), stations=["ruler"]).values.shape == (12, 1)
+
+
+def test_a_root_behind_the_horizon_is_not_asked_for(monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    p = lossy(8)
+    good, delay = p.model.sensors
+    model = dataclasses.replace(p.model, sensors=(good, dataclasses.replace(delay, visible=("x - 1.1",))))
+    tracking = pz.simulate(dataclasses.replace(p, model=model), np.arange(0.0, 3.0, 0.25), np.random.default_rng(0))
+    assert 0 < (tracking.row_stations == "mast").sum() < 12 and not np.isnan(tracking.values).any()
+
+
+@pytest.mark.parametrize("text", ["ekf:gate", "iekf:3:gate", "srekf:gate", "ukf:gate"])
+def test_a_gate_still_rejects_what_is_merely_far_away(text, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    p = lossy(8)
+    tracking = pz.Tracking([0.0, 0.0, 0.1], [[2.0], [1e10], [1.95]], ["ruler", "mast", "ruler"])
+    found = parse(text).estimate(p, tracking)
+    assert found.success and found.details["rejected"].tolist() == [False, True, False]
 
 
 def test_a_root_is_no_number_where_its_residual_is_too_large():

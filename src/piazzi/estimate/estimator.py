@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 
 from piazzi.drawn import Drawn
-from piazzi.estimate.lost_root import lost_root
 from piazzi.estimate.soundness import defect
 from piazzi.kernels import build_seconds
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, Locked
 from piazzi.problem.epochs import epoch_of
+from piazzi.problem.lost_root import lost_root
 from piazzi.text import listed
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ class Estimate(Locked, Drawn):
     def _why_not(self) -> str:
         found = self.failure or self._defect()
         root = lost_root(self.problem, self.tracking, self.mean) if found else ""
-        return f"{found}: {root}" if root else found
+        return f"{found}: {root}" if root and root not in found else found
 
     def _defect(self) -> str:
         """The first epoch whose result cannot be used, "" if there is none."""

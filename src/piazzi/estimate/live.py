@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from piazzi import kernels
-from piazzi.estimate.lost_root import has_roots
 from piazzi.estimate.saved import Saved
 from piazzi.estimate.session import Session
 from piazzi.estimate.width import too_wide_message
@@ -17,6 +16,7 @@ from piazzi.kernels.bundle import Belief, Innovations
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, check_span
 from piazzi.problem.inputs import measured_by, unresolved
+from piazzi.problem.lost_root import has_roots
 from piazzi.problem.manoeuvres import check_after
 
 

@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from piazzi.estimate.live import Clock, checked_measurement, clock_times
-from piazzi.estimate.lost_root import has_roots
 from piazzi.estimate.root import Results, Root, RootKernel
 from piazzi.estimate.saved import Saved
 from piazzi.estimate.session import Session
@@ -16,6 +15,7 @@ from piazzi.kernels.bundle import Run
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import measured_by
+from piazzi.problem.lost_root import has_roots
 
 
 class _Epoch:

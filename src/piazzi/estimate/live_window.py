@@ -11,7 +11,6 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.live import Clock, checked_measurement
 from piazzi.estimate.losses import Loss
-from piazzi.estimate.lost_root import has_roots
 from piazzi.estimate.robust_window import loss_numbers, window_fragments
 from piazzi.estimate.saved import MOST_STEPS, Saved, check_order, check_steps
 from piazzi.estimate.session import Session
@@ -22,6 +21,7 @@ from piazzi.kernels.spec import lanes_for
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import measured_by
+from piazzi.problem.lost_root import has_roots
 
 
 def window_opens(newest: Any, lag_seconds: float) -> Any:

@@ -10,10 +10,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from piazzi.estimate.lost_root import lost_root_of
 from piazzi.estimate.soundness import defect
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.lost_root import lost_root_of
 
 
 class Session(ABC):

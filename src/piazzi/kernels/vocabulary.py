@@ -154,6 +154,7 @@ predict_deviation: Any
 backward: Any
 update_deviation: Any
 squared_innovation: Any
+is_beyond: Any
 update_epoch_guarded: Any
 # written in fragments/graph_linearize.py
 weigh_dynamics: Any

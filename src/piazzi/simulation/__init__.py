@@ -14,6 +14,7 @@ from piazzi.problem.arcs import arc
 from piazzi.problem.checks import Array, check_span, finite_vector, numeric
 from piazzi.problem.gaps import is_restricted
 from piazzi.problem.inputs import Inputs, wrapped
+from piazzi.problem.lost_root import check_roots
 from piazzi.problem.truth import true_problem
 from piazzi.simulation.long_gaps import gap_warning
 from piazzi.simulation.rule import MOST_DRAWS, NoTruthError, Rule
@@ -51,7 +52,7 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
     Raises
     ------
     ValueError
-        For bad times, unknown stations, a truth that becomes infinite, or nothing to be seen.
+        For bad times, unknown stations, a truth that becomes infinite, a root without a solution, or nothing to be seen.
     """
     epochs = check_times(times)
     truth_half = problem.truth or Truth()
@@ -66,9 +67,11 @@ def simulate(problem: Problem, times: Any, rng: np.random.Generator, stations: S
     states, z = propagate(problem, actual, epochs, index, first, w, v if truth_half.measurement_noise else None)
     names = np.array([s.name for s in problem.stations])[np.tile(index, K)] if len(problem.stations) > 1 else None
     whole = Tracking(np.repeat(epochs, len(index)), z, names, states, problem.epoch)
+    marks = seen(actual, epochs, states)[:, index]
+    check_roots(actual, epochs, index, states, z, marks)
     if not is_restricted(problem):
         return whole
-    tracking = _measured(problem, whole, seen(actual, epochs, states)[:, index])
+    tracking = _measured(problem, whole, marks)
     if told := gap_warning(problem, tracking):
         warnings.warn(told, stacklevel=2)
     return tracking

@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi.problem import Problem, Tracking, Truth
 from piazzi.problem.checks import Array
+from piazzi.problem.lost_root import check_roots, has_roots
 from piazzi.simulation import (
     MOST_DRAWS,
     NoTruthError,
@@ -91,7 +92,16 @@ def _faults(world: Problem, actual: Problem, times: Array, draws: Draws, truth: 
             out[i] = "no station sees anything" if empty else "the simulated measurements are not finite"
         except ValueError as error:
             out[i] = str(error)
-    return out
+    return [text or _lost(actual, times, truth[i], z[i]) for i, text in enumerate(out)] if has_roots(actual.model) else out
+
+
+def _lost(actual: Problem, times: Array, truth: Array, z: Array) -> str:
+    """Which root has no solution where a station sees, "" where all have."""
+    try:
+        check_roots(actual, times, np.arange(len(actual.stations)), truth, z, seen(actual, times, truth))
+    except ValueError as error:
+        return str(error)
+    return ""
 
 
 @dataclass(frozen=True, eq=False)

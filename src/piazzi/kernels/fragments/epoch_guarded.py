@@ -32,6 +32,16 @@ def squared_innovation(row, innovations, L):
 
 
 @inline
+def is_beyond(row, squared, limit, innovations):
+    """1 for a row beyond the gate, else 0; a row without a prediction is taken, so that the failure shows."""
+    beyond = 1 if squared > limit else 0
+    for i in range(M):
+        if fabs(innovations.nu[row * M + i]) == inf:
+            beyond = 0
+    return beyond
+
+
+@inline
 def gate_rows(run, k, x, P, p, measured, gate, innovations):
     """Innovations of all rows at the prediction, and which rows lie beyond the gate of their number of components."""
     own = Row(scratch(M), scratch(MN), scratch(WORK))
@@ -39,7 +49,7 @@ def gate_rows(run, k, x, P, p, measured, gate, innovations):
         innovate_row(measured, row, run.t[k], x, p, own.nu, own.H, 0)
         record(row, P, measured, own, innovations)
         squared, present = squared_innovation(row, innovations, own.work)
-        gate.rejected[row] = 1 if squared > gate.limits[present] else 0
+        gate.rejected[row] = is_beyond(row, squared, gate.limits[present], innovations)
 
 
 @inline
@@ -61,6 +71,7 @@ def update_epoch_guarded(run, k, x, P, p, measured, gate, innovations):
             if gate.rejected[row] == 0:
                 innovate_row(measured, row, run.t[k], x + offset, p, own.nu, own.H, 0)
                 for i in range(M):
-                    own.nu[i] = own.nu[i] + load_vector(own.H, i * N, N) @ offset
+                    told = own.nu[i] + load_vector(own.H, i * N, N) @ offset
+                    own.nu[i] = unless_missing(measured.z[row * M + i], told)
                 d, P_new = update_row(d, P_new, measured.station[row], measured, own)
     return x + d, P_new

@@ -37,7 +37,7 @@ def run_root_filter(
             innovate_root(measured, row, run.t[k], x, p, root, own, joint)
             record_root(row, measured, own, joint, innovations)
             squared, present = squared_innovation(row, innovations, own.work)
-            gate.rejected[row] = 1 if squared > gate.limits[present] else 0
+            gate.rejected[row] = is_beyond(row, squared, gate.limits[present], innovations)
             if gate.rejected[row] == 0:
                 update_root_row(row, measured, own, joint)
         x = finish_epoch(x, root, joint)

@@ -1,4 +1,4 @@
-"""Which root of which station was not found, where an estimate cannot be used."""
+"""Which root of which station was not found, where an estimate cannot be used or a measurement not be simulated."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from piazzi.kernels import KernelSpec, load_plain
 from piazzi.kernels.bundle import Given
 from piazzi.model import Model, Sensor
 from piazzi.model.functions import ROOT
-from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.problem.problem import Problem
+from piazzi.problem.tracking import Tracking
 
 MOST_EPOCHS = 100  # that are looked at
 
@@ -37,6 +38,25 @@ def lost_root_of(problem: Problem, s: int, t: float, x: Array) -> str:
         return _lost_at(problem, s, t, x, problem.given_over(t, t))
     except (ValueError, ArithmeticError):
         return ""
+
+
+def check_roots(problem: Problem, times: Array, index: Array, states: Array, z: Array, marks: Array) -> None:
+    """Raise ValueError where a simulated measurement has no value because a root has no solution.
+
+    Parameters
+    ----------
+    times, index, states : (K,), stations (S,) that measure at each of them, (K, n)
+    z : (K S, m)
+    marks : (K, S), which of them measure
+    """
+    if not has_roots(problem.model):
+        return
+    width = np.array([len(s.noise) for s in problem.stations])[index]
+    there = marks[:, :, None] & (np.arange(z.shape[1]) < width[:, None])
+    for k, s in np.argwhere((there & np.isnan(z.reshape(there.shape))).any(axis=2))[:MOST_EPOCHS]:
+        lost = lost_root_of(problem, int(index[s]), float(times[k]), np.ascontiguousarray(states[k]))
+        if lost:
+            raise ValueError(f"nothing can be simulated: {lost}")
 
 
 def has_roots(model: Model) -> bool:
