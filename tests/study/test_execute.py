@@ -20,7 +20,7 @@ from piazzi.study.runner import RETRIES
 from piazzi.study.runs import simulated
 from piazzi.study.tasks import Piece, Task
 from piazzi.study.versions import fingerprint
-from tests.study.estimators import Poison
+from tests.study.estimators import Poison, Refusing
 from tests.study.studies import small
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -74,12 +74,87 @@ def test_interrupted_and_resumed_is_the_same_and_computes_nothing_twice(whole, t
     assert done == []
 
 
+def _counted(monkeypatch):
+    """Tasks of studies that are computed in this process from now on."""
+    done = []
+    monkeypatch.setattr(pool, "run_task", lambda s, task: done.append(task) or pieces.run_task(s, task))
+    return done
+
+
+def test_a_finished_study_is_extended_without_computing_a_run_again(whole, tmp_path, monkeypatch):
+    """Extended to 80 runs it has the bits of one of 80, and only the 20 that were missing are computed."""
+    study, sixty = whole
+    eighty = small(runs=80, vary={"R.scale": [1, 4]})
+    run_study(eighty, tmp_path / "anew.nc", workers=0)
+    path = tmp_path / "s.nc"
+    path.write_bytes(sixty.read_bytes())
+    done = _counted(monkeypatch)
+    stored = run_study(eighty, path, workers=0, resume=True)
+    assert same_results(path, tmp_path / "anew.nc") == []
+    assert sum(task.count for task in done) == 2 * 20
+    assert all(task.first >= 60 for task in done if task.count)
+    before = read_store(sixty)
+    for point in (0, 1):
+        np.testing.assert_array_equal(stored.row(point, 0).error[:60], before.row(point, 0).error)
+        np.testing.assert_array_equal(stored.row(point, 0).numbers["seconds"][:60], before.row(point, 0).numbers["seconds"])
+    assert sorted(os.listdir(tmp_path)) == ["anew.nc", "s.nc"]
+
+
+def test_an_interrupted_study_and_an_interrupted_extension_are_extended(whole, tmp_path, monkeypatch):
+    study, sixty = whole
+    eighty = small(runs=80, vary={"R.scale": [1, 4]})
+    run_study(eighty, tmp_path / "anew.nc", workers=0)
+    path = tmp_path / "s.nc"
+    with pytest.raises(KeyboardInterrupt):
+        run_study(study, path, workers=0, chunk=8, progress=_interrupt_after(40))
+    done = _counted(monkeypatch)
+    with pytest.raises(KeyboardInterrupt):
+        run_study(eighty, path, workers=0, chunk=8, progress=_interrupt_after(100), resume=True)
+    run_study(eighty, path, workers=0, resume=True)
+    assert same_results(path, tmp_path / "anew.nc") == []
+    assert sum(task.count for task in done) == 160 - 40
+
+    path.write_bytes(sixty.read_bytes())
+    with pytest.raises(KeyboardInterrupt):
+        run_study(eighty, path, workers=0, chunk=8, progress=_interrupt_after(136), resume=True)
+    assert run_study(study, path, workers=0, resume=True).about["specification"]["runs"] == 60  # which leaves the rest
+    done.clear()
+    run_study(eighty, path, workers=0, resume=True)
+    assert same_results(path, tmp_path / "anew.nc") == []
+    assert sum(task.count for task in done) == 160 - 136
+
+
+def test_runs_of_another_version_are_not_added_to(whole, tmp_path, monkeypatch):
+    path = tmp_path / "s.nc"
+    path.write_bytes(whole[1].read_bytes())
+    eighty = small(runs=80, vary={"R.scale": [1, 4]})
+    changed = {**fingerprint(), "numba": "0.1"}
+    monkeypatch.setattr("piazzi.study.extending.fingerprint", lambda: changed)
+    with pytest.raises(ValueError, match="was made by numba .*, not 0.1 as here: more runs would not be of the same study"):
+        run_study(eighty, path, workers=0, resume=True)
+    assert run_study(whole[0], path, workers=0, resume=True).about["specification"]["runs"] == 60
+
+
+def test_runs_that_failed_keep_their_reasons_when_a_study_is_extended(tmp_path):
+    path = tmp_path / "s.nc"
+    first = simulated(small(runs=30), Task(0, 0, 30)).z[:, 0, 0]
+    limit = float(np.sort(first)[-10])
+    refusing = {"ekf": "ekf", "refusing": Refusing(limit)}
+    run_study(small(runs=20, estimators=refusing), path, workers=0)
+    stored = run_study(small(runs=30, estimators=refusing), path, workers=0, resume=True)
+    expected = [[run, f"first measurement {first[run]:.3g} is too large"] for run in np.flatnonzero(first > limit).tolist()]
+    assert 0 < sum(run < 20 for run, _ in expected) < len(expected)
+    assert [m[2:] for m in stored.about["messages"]] == expected
+
+
 def test_other_studies_stores_are_refused(whole, tmp_path):
     study, expected = whole
-    other = small(runs=61, vary={"R.scale": [1, 4]})
+    fewer = small(runs=59, vary={"R.scale": [1, 4]})
     for resume in (False, True):
-        with pytest.raises(ValueError, match="holds another study: runs is 60 there and 61 here"):
-            run_study(other, expected, workers=0, resume=resume)
+        with pytest.raises(ValueError, match="holds another study: runs is 60 there and 59 here"):
+            run_study(fewer, expected, workers=0, resume=resume)
+    with pytest.raises(ValueError, match="holds 60 runs of this study: --resume adds the 1 that are missing"):
+        run_study(small(runs=61, vary={"R.scale": [1, 4]}), expected, workers=0)
     with pytest.raises(ValueError, match="holds this study, finished: --resume shows it"):
         run_study(study, expected, workers=0)
     with pytest.raises(KeyboardInterrupt):

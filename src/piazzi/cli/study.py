@@ -27,7 +27,7 @@ ENDINGS = (".nc",)
 @options.estimators("the scenario's, or ekf")
 @click.option("--vary", multiple=True, metavar="NAME=V,V,...", help="Vary this; may be repeated, for a grid.  See above.")
 @options.output("Keep all runs in this .nc file.")
-@click.option("--resume", is_flag=True, help="Continue this study from the runs in FILE.")
+@click.option("--resume", is_flag=True, help="Continue this study from the runs in FILE, or add runs to it.")
 @click.option(
     "--workers", type=options.WholeNumber(0), metavar="N", help="Processes; 0 is this one.  [default: one per processor]"
 )
@@ -55,7 +55,8 @@ def command(
     """Simulate, estimate and score many runs of SCENARIO.
 
     Run i is the same whatever the workers, their number or the order: draws of prior, process and measurement noise are
-    children of the seed.  Completed runs are saved: after Ctrl-C, a crash or a full disk, --resume continues from there.
+    children of the seed.  Completed runs are saved: after Ctrl-C, a crash or a full disk, --resume continues from there.  With more --runs than FILE has it adds those
+    that are missing.
 
     --vary takes settings of estimators (lag, iterations, gate, ...), and R.scale, R.STATION.scale, Q.scale, P.scale, substeps
     and parameters of the scenario; those change what happens and what is believed, with assumed. or truth. before the name one
@@ -66,6 +67,7 @@ def command(
       piazzi study b612-range --with window --vary lag=10,50 --vary R.scale=1,4
       piazzi study b612-range --with ekf --vary assumed.Q.scale=0.1,1,10
       piazzi study founding-study -o founding.nc --resume
+      piazzi study b612-range --runs 80 -o sixty.nc --resume
     """
     if output_file == output.STDOUT:
         raise click.UsageError("-o -: a study goes into a .nc file", click.get_current_context())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 from piazzi.io.atomic import check_writable
 from piazzi.kernels.ahead import processors
 from piazzi.scenarios import load_scenario
+from piazzi.study.extending import begun, longer
 from piazzi.study.log import ENDING, Log
 from piazzi.study.plan import Plan
 from piazzi.study.pool import Processes, ThisProcess, Workers
@@ -81,7 +83,7 @@ def run_study(
     ----------
     study : Study
     path : of the store, ``.nc``
-    resume : continue what is there; a finished study is read, nothing is computed twice
+    resume : continue what is there, be it of fewer runs; a finished study is read, nothing is computed twice
     workers : processes, default one for each processor; 0 runs in this one
     scheduler : address of a Dask scheduler, or "local" to start a cluster of `workers` processes here
     chunk : runs per task; default as many as take about a second
@@ -103,13 +105,12 @@ def run_study(
     if store.suffix.lower() != ".nc":
         raise ValueError(f"{os.fspath(path)}: a study is kept in a .nc file")
     check_writable(store)
-    finished = _finished(study, store, resume)
+    found = _found(study, store, resume)
     log_path = store.with_name(store.name + ENDING)
-    if finished is not None:
-        if log_path.exists():  # its end came between the two
-            log_path.unlink()
-        return finished
-    log = _log(study, log_path, resume)
+    if found is not None and found.about["specification"]["runs"] == study.runs:
+        _tidy(study, log_path)
+        return found
+    log = _log(study, log_path, resume, found)
     try:
         team = _workers(study, workers, scheduler)
         try:
@@ -137,25 +138,41 @@ def kept_runs(path: str | os.PathLike[str]) -> int:
     return sum(entry.task.count for entry in log.entries)
 
 
-def _finished(study: Plan, store: Path, resume: bool) -> Stored | None:
-    """The store, where it is there and of this study."""
+def _found(study: Plan, store: Path, resume: bool) -> Stored | None:
+    """The store, where it is there and of this study; it may have fewer runs."""
     if not store.exists():
         return None
     found = read_store(store)
-    differs = difference(found.about["specification"], study.specification)
+    there = found.about["specification"]
+    fewer = there["runs"] < study.runs
+    differs = difference(there | ({"runs": study.runs} if fewer else {}), study.specification)
     if differs:
         raise ValueError(f"{store} holds another study: {differs}")
-    if not resume:
-        raise ValueError(f"{store} holds this study, finished: --resume shows it, another name or no file there runs it anew")
-    return found
+    if resume:
+        return found
+    if fewer:
+        more = study.runs - there["runs"]
+        raise ValueError(f"{store} holds {there['runs']:,} runs of this study: --resume adds the {more:,} that are missing")
+    raise ValueError(f"{store} holds this study, finished: --resume shows it, another name or no file there runs it anew")
 
 
-def _log(study: Plan, path: Path, resume: bool) -> Log:
+def _tidy(study: Plan, path: Path) -> None:
+    """Remove the log of a study whose end came between the store and that; one of more runs stays."""
+    with suppress(OSError, ValueError):
+        log = Log.open(path)
+        if log.specification.get("runs") == study.runs:
+            log.remove()
+        log.close()
+
+
+def _log(study: Plan, path: Path, resume: bool, found: Stored | None = None) -> Log:
     if not path.exists():
-        return Log.create(path, study.specification | {"versions": fingerprint()})
+        return Log.create(path, study.specification | {"versions": fingerprint()}) if found is None else begun(study, found, path)
     if not resume:
         raise ValueError(f"{path} has runs of a study that was not finished: --resume continues it, removing it starts again")
-    return Log.open(path, partial(checks, study, path))
+    check = partial(checks, study, path)
+    log = Log.open(path, check)
+    return log if log.specification["runs"] == study.runs else longer(study, log, check)
 
 
 def _workers(study: Plan, workers: int | None, scheduler: str | None) -> Workers:

@@ -115,9 +115,12 @@ class Plan:
         return problems_at(self.problem, self.axes, self.point(index))
 
     @cached_property
-    def variants(self) -> dict[str, Any]:
-        """Every estimator with every combination of the settings that are varied and that it has, by its name here."""
-        out: dict[str, Any] = {}
+    def _variants(self) -> dict[str, tuple[Any, str, dict[str, Value]]]:
+        """Every estimator with every combination of the settings that are varied and that it has, by its name here.
+
+        With each, the name that it was given and those settings.
+        """
+        out: dict[str, tuple[Any, str, dict[str, Value]]] = {}
         for name, estimator in self.estimators.items():
             own = [axis for axis in self._split[1] if axis.name in estimator_settings(estimator)]
             for values in product(*(axis.values for axis in own)):
@@ -126,10 +129,20 @@ class Plan:
                     raise ValueError(f"{name} has a length in seconds, so its lag cannot be varied: give it one in states")
                 made = variant(estimator, settings) if settings else estimator
                 label = _label(name, made, settings)
-                if label in out and _described(out[label]) != _described(made):
+                if label in out and _described(out[label][0]) != _described(made):
                     raise ValueError(f"two estimators would both be called {label}: vary one at a time, or name them apart")
-                out[label] = made
+                out[label] = made, name, settings
         return out
+
+    @cached_property
+    def variants(self) -> dict[str, Any]:
+        """Every estimator with every combination of the settings that are varied and that it has, by its name here."""
+        return {label: made for label, (made, *_) in self._variants.items()}
+
+    @cached_property
+    def settings(self) -> dict[str, tuple[str, dict[str, Value]]]:
+        """By the name of each estimator here, the name that it was given, and those of its settings that are varied."""
+        return {label: (name, settings) for label, (_, name, settings) in self._variants.items() if settings}
 
     @cached_property
     def rows(self) -> tuple[tuple[str, View], ...]:

@@ -16,8 +16,15 @@ from piazzi.study.versions import difference_of, fingerprint
 
 
 def checks(study: Plan, path: Path, specification: Mapping[str, Any]) -> Check:
-    """What a record of the study's log has to be; raises ValueError for the log of another study, or of other versions."""
-    differs = difference({k: v for k, v in specification.items() if k != "versions"}, study.specification)
+    """What a record of the study's log has to be; raises ValueError for the log of another study, or of other versions.
+
+    It may have been begun with fewer runs.
+    """
+    there = {k: v for k, v in specification.items() if k != "versions"}
+    runs = there.get("runs")
+    if isinstance(runs, int) and 0 < runs < study.runs:
+        there["runs"] = study.runs
+    differs = difference(there, study.specification)
     if differs:
         raise ValueError(f"{path} has runs of another study: {differs}")
     versions = specification.get("versions")

@@ -14,6 +14,7 @@ from piazzi.study.log import Log
 from piazzi.study.plan import SCHEMA, Plan
 from piazzi.study.score import NUMBERS
 from piazzi.study.tasks import Piece, joined
+from piazzi.study.versions import fingerprint
 
 _RUNS_TOGETHER = 256
 _WRITTEN_TOGETHER = 1 << 25  # bytes
@@ -69,10 +70,12 @@ def _about(study: Plan) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "piazzi": version("piazzi"),
+        "versions": fingerprint(),
         "specification": study.specification,
         "digest": study.digest,
         "rows": [list(row) for row in study.rows],
         "axes": [axis.name for axis in study.axes],
+        "settings": study.settings,
         "points": [list(study.point(i)) for i in range(study.points)],
         "groups": list(study.groups),
         "units": [sorted({model.unit(model.names[i]) for i in columns}) for columns in study.groups.values()],
