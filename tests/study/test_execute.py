@@ -83,7 +83,7 @@ def _counted(monkeypatch):
 
 def test_a_finished_study_is_extended_without_computing_a_run_again(whole, tmp_path, monkeypatch):
     """Extended to 80 runs it has the bits of one of 80, and only the 20 that were missing are computed."""
-    study, sixty = whole
+    _, sixty = whole
     eighty = small(runs=80, vary={"R.scale": [1, 4]})
     run_study(eighty, tmp_path / "anew.nc", workers=0)
     path = tmp_path / "s.nc"
@@ -130,7 +130,7 @@ def test_runs_of_another_version_are_not_added_to(whole, tmp_path, monkeypatch):
     eighty = small(runs=80, vary={"R.scale": [1, 4]})
     changed = {**fingerprint(), "numba": "0.1"}
     monkeypatch.setattr("piazzi.study.extending.fingerprint", lambda: changed)
-    with pytest.raises(ValueError, match="was made by numba .*, not 0.1 as here: more runs would not be of the same study"):
+    with pytest.raises(ValueError, match=r"was made by numba .*, not 0\.1 as here: more runs would not be of the same study"):
         run_study(eighty, path, workers=0, resume=True)
     assert run_study(whole[0], path, workers=0, resume=True).about["specification"]["runs"] == 60
 

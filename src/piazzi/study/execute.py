@@ -167,7 +167,8 @@ def _tidy(study: Plan, path: Path) -> None:
 
 def _log(study: Plan, path: Path, resume: bool, found: Stored | None = None) -> Log:
     if not path.exists():
-        return Log.create(path, study.specification | {"versions": fingerprint()}) if found is None else begun(study, found, path)
+        new = study.specification | {"versions": fingerprint()}
+        return Log.create(path, new) if found is None else begun(study, found, path)
     if not resume:
         raise ValueError(f"{path} has runs of a study that was not finished: --resume continues it, removing it starts again")
     check = partial(checks, study, path)

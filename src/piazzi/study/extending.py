@@ -58,7 +58,7 @@ def _filled(study: Plan, path: Path, pieces: Iterable[Piece], runs: int) -> Log:
 def _pieces(stored: Stored) -> Iterator[Piece]:
     """Everything in a store, as it came: the bound of each point and its runs, a few hundred at a time."""
     runs = int(stored.about["specification"]["runs"])
-    unknown = {point: text for point, text in stored.about.get("bounds_unknown", [])}
+    unknown = dict(stored.about.get("bounds_unknown", []))
     with hdf5.opened(stored.path) as root:
         for point in range(len(stored.points)):
             why = ((-1, -1, unknown[point]),) if point in unknown else ()
