@@ -55,8 +55,8 @@ def command(
     """Simulate, estimate and score many runs of SCENARIO.
 
     Run i is the same whatever the workers, their number or the order: draws of prior, process and measurement noise are
-    children of the seed.  Completed runs are saved: after Ctrl-C, a crash or a full disk, --resume continues from there.  With more --runs than FILE has it adds those
-    that are missing.
+    children of the seed.  Completed runs are saved: after Ctrl-C, a crash or a full disk, --resume continues from there, and
+    with more --runs than FILE has it adds those that are missing.
 
     --vary takes settings of estimators (lag, iterations, gate, ...), and R.scale, R.STATION.scale, Q.scale, P.scale, substeps
     and parameters of the scenario; those change what happens and what is believed, with assumed. or truth. before the name one
