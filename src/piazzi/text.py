@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields
 from typing import Any
 
 LONGEST = 500
+BRIEF = 400  # characters of a result in a terminal
 _FORMULA = re.compile(r"'*[=+\-@\t\r]")
 _GUARDED = re.compile(r"'+[=+\-@\t\r]")
 
@@ -71,3 +73,43 @@ def nearest(name: str, valid: Iterable[object]) -> str:
     """'; did you mean ...?' with the nearest valid name, or the list of them."""
     options = [str(v) for v in valid]
     return suggest(name, options) or (f"; known: {', '.join(options)}" if options else "")
+
+
+def brief(thing: Any) -> str:
+    """A dataclass in a terminal: fields that differ from their defaults, arrays by their shape, long values by their size."""
+    told = []
+    for field in fields(thing):
+        value = getattr(thing, field.name, None)
+        if field.repr and not (value is None or value is field.default or _same(value, field)):
+            told.append(f"{field.name}={_brief(value)}")
+    text = f"{type(thing).__qualname__}({', '.join(told)})"
+    return text if len(text) <= BRIEF else text[: BRIEF - 5] + " ...)"
+
+
+def _same(value: Any, field: Any) -> bool:
+    """Whether a plain value, or an empty one, is the default of its field."""
+    if field.default is not MISSING:
+        return isinstance(value, str | int | float | tuple) and type(value) is type(field.default) and value == field.default
+    return field.default_factory is not MISSING and isinstance(value, Mapping | tuple | list) and not value
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, str | int | float | bool):
+        return shown(value)
+    shape = getattr(value, "shape", ())
+    if shape:
+        few = len(shape) == 1 and shape[0] <= 3
+        return f"[{', '.join(f'{v:.6g}' for v in value)}]" if few else f"<{' x '.join(map(str, shape))} numbers>"
+    if isinstance(value, Mapping):
+        return f"{{{listed((one_line(str(key), 30) for key in value), 4)}}}"
+    if isinstance(value, tuple | list | set | frozenset):
+        text = ", ".join(map(_brief, value)) if len(value) <= 4 else ""
+        return (
+            f"({text})"
+            if text and len(text) <= 100
+            else f"<{len(value)} of {type(next(iter(value))).__name__}>"
+            if value
+            else "()"
+        )
+    text = repr(value)
+    return text if len(text) <= 80 else f"<{type(value).__name__}>"

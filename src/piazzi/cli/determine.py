@@ -36,9 +36,11 @@ def command(files: tuple[str, ...], **given: Any) -> int:
     --guess all orbits that fit are looked for.
 
     Examples:
+      piazzi determine lageos-2 --report l2.html      lasers, in the package
+      piazzi determine ceres-1801                     what Piazzi saw, too
       piazzi determine fixes.oem -o orbit.oem
       piazzi determine precise.sp3 --object G01 --with graph --with batch
-      piazzi determine lageos2.npt --stations SLRF2014.snx --report l2.html
+      piazzi determine night.npt --stations SLRF2014.snx --report night.html
       piazzi determine lageos2.npt --stations ilrs --guess "x=7527km y=-9646km
         z=1464km vx=3.03km/s vy=1.72km/s vz=-4.45km/s
         epoch=2016-02-13T16:00:00Z frame=EME2000"

@@ -11,6 +11,7 @@ from piazzi.estimate.batch import undisturbed
 from piazzi.evaluate.information import NEGLIGIBLE, along, factor, predicted
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import prepare, wrapped
+from piazzi.text import brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +34,8 @@ class Analysis:
     rows: Array
     prior: Array
     prior_miss: Array
+
+    __repr__ = brief
 
     def information(self, keep: Array, scale: Array) -> Array:
         """Root (n, n) of the information of the rows to keep (J,) and of priors of constants, in units of `scale`."""

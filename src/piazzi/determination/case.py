@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from piazzi.determination import case_values as read
-from piazzi.text import nearest, one_line
+from piazzi.text import brief, nearest, one_line
 
 if TYPE_CHECKING:
     from piazzi.determination.published import Published
@@ -144,6 +144,8 @@ class Case:
     interpolation: tuple[str, int] | None = keyed("product", "interpolation", read.interpolation)
     answers: Mapping[str, Any] = field(default_factory=dict)  # by the names of ANSWERS
     published: tuple[Published, ...] = ()  # orbits of others, which a result stands beside
+
+    __repr__ = brief
 
     @classmethod
     def of(cls, words: Mapping[str, Any], where: str = "{}") -> Case:

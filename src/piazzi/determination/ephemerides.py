@@ -17,7 +17,7 @@ from piazzi.earth.stepping import longest_step
 from piazzi.evaluate.grids import Grid, as_html, as_rich
 from piazzi.evaluate.quantities import finite, number
 from piazzi.problem.checks import Array
-from piazzi.text import printable
+from piazzi.text import brief, printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -57,6 +57,8 @@ class Sky:
     columns: Mapping[str, Array]
     passes: tuple[Passage, ...] | None
     span: tuple[Epoch, Epoch]
+
+    __repr__ = brief
 
     @property
     def epochs(self) -> list[Epoch]:

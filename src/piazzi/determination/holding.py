@@ -24,6 +24,7 @@ from piazzi.evaluate.information import singular
 from piazzi.evaluate.quantities import finite
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import wrapped
+from piazzi.text import brief
 
 MANY = 60  # passes, beyond which not each is left out unasked
 NEAR, ROUNDS = 0.1, 4  # sigma of a last step from solution to solution, and how many
@@ -61,6 +62,8 @@ class Held:
     how: str
     groups: tuple[Unseen, ...]
     skipped: int
+
+    __repr__ = brief
 
     @property
     def nees(self) -> float:

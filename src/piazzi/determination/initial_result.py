@@ -12,6 +12,7 @@ from piazzi.determination.ridge import Ridge
 from piazzi.earth import Epoch
 from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
+from piazzi.text import brief
 
 SCHEMA = "piazzi.orbits/1"
 STATES = ("x", "y", "z", "vx", "vy", "vz")
@@ -89,6 +90,8 @@ class InitialOrbits:
     apart: Parting | None = None
     about: str = "earth"
     ridge: Ridge | None = None
+
+    __repr__ = brief
 
     def to_dict(self) -> dict[str, Any]:
         """The object of schema piazzi.orbits/1: m, m/s, rad."""

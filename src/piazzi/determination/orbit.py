@@ -14,6 +14,7 @@ from piazzi.earth import Epoch, rotation_rate
 from piazzi.earth.rotation import TURNING, frame_named
 from piazzi.orbit import Keplerian, state_axes, transform_root
 from piazzi.problem.checks import Array
+from piazzi.text import brief
 
 FLOOR = 1e-15  # of a correlation's largest eigenvalue: rounding, below which none is written
 KEPLERIAN = ("a", "e", "i", "raan", "argp", "nu")
@@ -45,6 +46,8 @@ class Orbit:
     frame: str
     beliefs: Beliefs
     centre: Centre = EARTH
+
+    __repr__ = brief
 
     def at(self, epoch: Any = None) -> Array:
         """Position and velocity (6,) at a date, m and m/s; default where the answer stands."""

@@ -20,6 +20,7 @@ from piazzi.earth import Epoch, transform
 from piazzi.estimate.estimator import Estimate
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
+from piazzi.text import listed, one_line
 
 if TYPE_CHECKING:
     import xarray
@@ -194,6 +195,13 @@ class Determination:
         from piazzi.determination.figures import figures
 
         return figures(self, folder, formats, width)
+
+    def __repr__(self) -> str:
+        """In short: of what, by which estimators, from how many rows, and whether an orbit was determined."""
+        named = f" of {one_line(self.object, 60)}" if self.object else ""
+        used = f"{int(self.keep.sum())} of {len(self.keep)} rows, by {listed(self.estimates)}"
+        said = "determined" if self.determined else f"not determined: {one_line(self.message, 150)}"
+        return f"<Determination{named} at {self.epoch}, {used}; {said}>"
 
     def __str__(self) -> str:
         from piazzi.evaluate.grids import as_text

@@ -23,6 +23,7 @@ from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.arcs import Steps, arc
 from piazzi.problem.checks import Array
 from piazzi.problem.manoeuvres import SAME
+from piazzi.text import brief
 
 WIDE = 0.1  # of distance and speed: the sigma of a guess, which says where to begin and nothing else
 
@@ -52,6 +53,8 @@ class Setup:
     assumed: tuple[str, ...]
     earlier: Earlier | None = None
     before: tuple[Array, Array] | None = None
+
+    __repr__ = brief
 
     @property
     def labels(self) -> Mapping[str, Label]:

@@ -22,7 +22,7 @@ from piazzi.earth.space_weather import SpaceWeather, read_space_weather
 from piazzi.earth.thermosphere import Thermosphere
 from piazzi.earth.tides import RADIUS
 from piazzi.opening import opened
-from piazzi.text import nearest
+from piazzi.text import brief, nearest
 from piazzi.units import Units, is_quantity
 
 DEGREES = (8, 12, 20, 40, 70)
@@ -51,6 +51,8 @@ class ForceChoice:
     asteroid_kernel: str | Path | None = None
     weather: SpaceWeather | None = None
     assumed: tuple[str, ...] = ()
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         usual = {"cr_a_m": REFLECTED, "cd_a_m": DRAGGED}

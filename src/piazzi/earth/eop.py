@@ -20,6 +20,7 @@ from piazzi.earth.delta_t import MODEL, delta_t, delta_t_error
 from piazzi.earth.finding import found
 from piazzi.earth.scales import Pole
 from piazzi.opening import opened
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 
@@ -89,6 +90,8 @@ class EOPTable:
     source: str
     measured: float
     _warned: list[bool] = field(default_factory=list, repr=False)
+
+    __repr__ = brief
 
     def _at(self, whole: Array, fraction: Array, early: bool = False) -> tuple[Array, Array, Array]:
         """First of the four days that an instant lies in the middle of, days since that day, and days past the table's end."""

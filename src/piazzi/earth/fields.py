@@ -19,6 +19,7 @@ import numpy as np
 from piazzi.earth.conventional import SOURCE, conventional
 from piazzi.earth.epoch import Epoch
 from piazzi.opening import opened
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 
@@ -67,6 +68,8 @@ class GravityField:
     tide_system: str
     source: str
     terms: tuple[Term, ...] = ()
+
+    __repr__ = brief
 
     @property
     def degree(self) -> int:

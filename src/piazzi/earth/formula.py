@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.expressions.numeric import evaluate_arrays
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 
@@ -33,6 +34,8 @@ class Formula:
     definitions: Mapping[str, str]
     outputs: tuple[str, ...]
     source: str
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "definitions", MappingProxyType(dict(self.definitions)))

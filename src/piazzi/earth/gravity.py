@@ -13,6 +13,7 @@ import numpy as np
 from piazzi.earth.fields import GravityField, gravity_field
 from piazzi.model.functions import Signature
 from piazzi.outside.evaluation import aligned, check_count, checksum, derivatives, value
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 SIGNATURE = Signature("gravity", 3, 3, tuple((i, j) for i in range(3) for j in range(3)))
@@ -42,6 +43,8 @@ class Gravity:
     gradient_degree: int | None = None
     on: bool = True
     signature: Signature = field(default=SIGNATURE, init=False, repr=False)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         found = self.field

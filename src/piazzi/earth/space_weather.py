@@ -13,6 +13,7 @@ import numpy as np
 from piazzi.earth.eop import mjd_text
 from piazzi.earth.epoch import Epoch
 from piazzi.opening import opened
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 
@@ -63,6 +64,8 @@ class SpaceWeather:
     kind: Array
     source: str
     _warned: list[bool] = field(default_factory=list, repr=False)
+
+    __repr__ = brief
 
     @property
     def measured(self) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from piazzi.earth.epoch import Epoch, pairs
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
-from piazzi.text import nearest
+from piazzi.text import brief, nearest
 
 Array = np.ndarray[Any, Any]
 
@@ -98,6 +98,8 @@ class Station:
     description: str = ""
     source: str = ""
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         if not self.coordinates:
             raise ValueError(f"station {self.name!r} has no coordinates")
@@ -172,6 +174,8 @@ class StationList(Mapping[str, Station]):
 
     stations: tuple[Station, ...]
     notes: tuple[str, ...] = ()
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         names = [s.name for s in self.stations]

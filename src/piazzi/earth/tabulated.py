@@ -26,6 +26,7 @@ from piazzi.earth.tides import station_displacement
 from piazzi.model.functions import STATION_TERMS, Signature
 from piazzi.outside.evaluation import check_count, checksum, derivatives, value
 from piazzi.outside.pieces import Pieces, fitted
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 DAY = scales.DAY
@@ -135,6 +136,8 @@ class Rotation(Tabulated):
     epoch: Epoch
     eop: Orientation | None = None
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         for name in ("from_", "to"):
             object.__setattr__(self, name, frame_named(getattr(self, name)))
@@ -209,6 +212,8 @@ class Body(Tabulated):
     center: str = "earth"
     scale: str = "TT"
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         if self.kernel is None:
             body(self.name, self.epoch, self.center)
@@ -249,6 +254,8 @@ class Place(Tabulated):
     eop: Orientation | None = None
     tides: bool = True
     about: str = "earth"
+
+    __repr__ = brief
 
     @cached_property
     def checksum(self) -> str:

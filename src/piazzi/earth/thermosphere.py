@@ -21,6 +21,7 @@ from piazzi.earth.rotation import rotation
 from piazzi.earth.space_weather import SpaceWeather, read_space_weather
 from piazzi.earth.tabulated import DAY, Tabulated
 from piazzi.outside.evaluation import checksum
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 SCALE_HEIGHTS = 3.0
@@ -59,6 +60,8 @@ class Thermosphere(Tabulated):
     orbit: Sequence[float]
     weather: SpaceWeather | str | Path
     orbit_time: float = 0.0
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         orbit = tuple(float(value) for value in self.orbit)

@@ -14,6 +14,7 @@ from piazzi.estimate.soundness import defect
 from piazzi.kernels.bundle import Belief, Beliefs, Run
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array, Locked, numeric
+from piazzi.text import brief
 
 MOST_PARTS = 10**7
 STEP = 0.1  # of a considered parameter's sigma, to either side: small beside what bends, large beside rounding
@@ -40,6 +41,8 @@ class Forecast(Locked):
     mean: Array
     covariance: Array
     growth: Array
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         for a in (self.times, self.mean, self.covariance, self.growth):

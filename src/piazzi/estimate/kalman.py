@@ -24,6 +24,7 @@ from piazzi.kernels.bundle import Belief, Beliefs, Innovations
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array, covariance, finite_vector, numeric
 from piazzi.problem.inputs import Inputs, measured_by, prepare
+from piazzi.text import brief
 
 Update = Literal["auto", "joint", "components"]
 
@@ -155,6 +156,8 @@ class Prediction:
     Phi: Array
     Q: Array
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True, eq=False)
 class Updated:
@@ -164,6 +167,8 @@ class Updated:
     covariance: Array
     innovation: Array
     innovation_covariance: Array
+
+    __repr__ = brief
 
 
 def predict(problem: Problem, belief: Any, t: float, dt: float) -> Prediction:

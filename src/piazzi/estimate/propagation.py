@@ -13,6 +13,7 @@ from piazzi.estimate.forecast import STEP, checked_times, forecast, moved
 from piazzi.estimate.soundness import defect
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array, Locked, numeric
+from piazzi.text import brief
 
 if TYPE_CHECKING:
     import xarray
@@ -34,6 +35,8 @@ class Propagation(Locked):
     times: Array
     mean: Array
     covariance: Array
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         for a in (self.times, self.mean, self.covariance):

@@ -14,7 +14,7 @@ from piazzi.formats.frames import KNOWN, frame_named, settled
 from piazzi.formats.kinds import ANGLES, KINDS, TAGS
 from piazzi.formats.observations import Array, Observations, Segment
 from piazzi.tables.names import parse_columns
-from piazzi.text import nearest, suggest
+from piazzi.text import brief, nearest, suggest
 from piazzi.units import Units
 
 RANGES = {"one-way": ("one-way", "sum"), "two-way": ("two-way", "half"), "round-trip": ("two-way", "sum")}
@@ -64,6 +64,8 @@ class Conventions:
     sigmas: tuple[Sigma, ...] = ()
     columns: tuple[tuple[str, str], ...] = ()
     options: tuple[tuple[str, Any], ...] = ()
+
+    __repr__ = brief
 
     @classmethod
     def of(

@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi.earth import Epoch
 from piazzi.formats.copying import reduced
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 
@@ -75,6 +76,8 @@ class Arc:
     burns: tuple[Burn, ...] = ()
     said: tuple[tuple[str, str], ...] = ()
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         put, count = object.__setattr__, len(np.atleast_1d(self.t))
         shapes: dict[str, tuple[int, ...]] = dict.fromkeys(("t", "clock", "clock_rate", "lines"), (count,))
@@ -131,6 +134,8 @@ class MeanElements:
     spacecraft: tuple[tuple[str, float], ...] = ()
     said: tuple[tuple[str, str], ...] = ()
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ephemeris:
@@ -154,6 +159,8 @@ class Ephemeris:
     assumed: tuple[str, ...] = ()
     open: tuple[str, ...] = ()
     left_out: tuple[tuple[str, int], ...] = ()
+
+    __repr__ = brief
 
     @property
     def objects(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 from piazzi.earth import Epoch
 from piazzi.formats.copying import reduced
 from piazzi.formats.kinds import KINDS, TAGS
-from piazzi.text import nearest
+from piazzi.text import brief, listed, nearest
 
 Array = np.ndarray[Any, Any]
 
@@ -72,6 +72,8 @@ class Segment:
     wavelength: float | None = None
     quality: str | None = None
     said: tuple[tuple[str, str], ...] = ()
+
+    __repr__ = brief
 
 
 _INDICES = {"kind": np.int16, "station": np.int32, "object": np.int32, "participant": np.int32, "segment": np.int32}
@@ -163,6 +165,13 @@ class Observations:
                 raise ValueError(f"column {name!r} goes from {column.min()} to {column.max()}; there are {end} of them")
         if not np.isfinite(self.t).all():
             raise ValueError(f"the time of row {int(np.flatnonzero(~np.isfinite(self.t))[0])} is not finite")
+
+    def __repr__(self) -> str:
+        """In short: how many rows, of what, by whom, when."""
+        kinds = listed(kind for kind in self.kinds if self.of_kind(kind).any())
+        people = "".join(f" {word} {listed(names)}" for word, names in (("by", self.stations), ("of", self.objects)) if names)
+        span = f"; {self.epoch + float(self.t.min())} to {self.epoch + float(self.t.max())}" if len(self) else ""
+        return f"<Observations: {len(self)} rows, {kinds}{people}{span}>"
 
     def __len__(self) -> int:
         return len(self.t)

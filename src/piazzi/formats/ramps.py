@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.formats.observations import Observations
-from piazzi.text import nearest
+from piazzi.text import brief, nearest
 
 Array = np.ndarray[Any, Any]
 
@@ -20,6 +20,8 @@ class Ramp:
     t: Array
     frequency: Array
     rate: Array
+
+    __repr__ = brief
 
     def at(self, t: Any) -> Array:
         """Frequency in Hz at instants of any shape; NaN before the first event."""

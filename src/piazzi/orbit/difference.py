@@ -11,6 +11,7 @@ from piazzi.earth import FRAMES, Epoch, rotation
 from piazzi.orbit.axes import orbit_axes
 from piazzi.orbit.differential import Array
 from piazzi.orbit.paths import Path, first_date, opened, path_of
+from piazzi.text import brief
 
 SCHEMA = "piazzi.difference/1"
 INSIDE = 14.156413609126675  # of chi-square with 3 degrees of freedom: 0.9973, as 3 sigma of one
@@ -42,6 +43,8 @@ class Difference:
     sigma: Array
     squared: Array
     told: tuple[dict[str, Any], dict[str, Any]]
+
+    __repr__ = brief
 
     @property
     def letters(self) -> tuple[str, str, str]:

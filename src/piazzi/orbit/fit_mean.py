@@ -13,6 +13,7 @@ from piazzi.orbit.differential import Array
 from piazzi.orbit.equinoctial import Equinoctial
 from piazzi.orbit.mean_elements import MU, sgp4_states
 from piazzi.orbit.paths import opened, path_of
+from piazzi.text import brief
 
 # mean motion (relative), h, k, p, q, mean longitude, and the drag term in 1/Earth radii: steps of differences
 _STEPS = np.array([1e-7, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-5])
@@ -33,6 +34,8 @@ class MeanFit:
     mean: MeanElements
     residuals: Array
     rms: float
+
+    __repr__ = brief
 
 
 def fit_sgp4(

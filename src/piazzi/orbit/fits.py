@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.orbit.library import fit_library
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 RANGE, RATE, DIRECTION, POSITION = 1, 2, 3, 4
@@ -37,6 +38,8 @@ class Rows:
     sigma: Array
     across: Array | None = None
     shared: Array | None = None
+
+    __repr__ = brief
 
     def __len__(self) -> int:
         return len(self.t)

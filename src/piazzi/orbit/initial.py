@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi.orbit.differential import Array, check_mu
 from piazzi.orbit.two_body import propagate_kepler
+from piazzi.text import brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,8 @@ class InitialOrbit:
     ranges: Array
     positions: Array
     residual: float
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ import numpy as np
 from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, Fits, Rows, Setting, fitted, squares
 from piazzi.orbit.starts import Moment, Region, classical, linked, moment, sampled
 from piazzi.orbit.two_body import propagate_kepler
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 BEST = 60  # samples that are fitted
@@ -40,6 +41,8 @@ class Mode:
     probability: float
     admissible: bool
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True, eq=False)
 class Search:
@@ -49,6 +52,8 @@ class Search:
     modes: tuple[Mode, ...]
     starts: int
     fits: int
+
+    __repr__ = brief
 
 
 def two_body_modes(

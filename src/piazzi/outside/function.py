@@ -16,6 +16,7 @@ from piazzi.opening import opened
 from piazzi.outside.differences import disagreement
 from piazzi.outside.evaluation import aligned, check_count, checksum, derivatives, numbers, plain_functions, value
 from piazzi.outside.fragment import Fragment, read_fragment
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 
@@ -63,6 +64,8 @@ class Function:
             data: Any = (),
             span: tuple[float, float] | None = None,
         ) -> None: ...
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         put = object.__setattr__

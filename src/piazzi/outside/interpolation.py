@@ -14,6 +14,7 @@ from piazzi.model.functions import Signature
 from piazzi.outside.evaluation import aligned, check_count, checksum, derivatives, numbers, value
 from piazzi.outside.samples import read_columns
 from piazzi.outside.splines import foretold, slopes
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 OUTSIDE = ("refuse", "clamp")
@@ -51,6 +52,8 @@ class Interpolation:
         def __init__(
             self, nodes: Any, values: Any, outside: str | Sequence[str] = "refuse", error: float | None = None
         ) -> None: ...
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         put = object.__setattr__

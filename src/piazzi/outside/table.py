@@ -13,6 +13,7 @@ from piazzi.model.functions import Signature
 from piazzi.outside.evaluation import checksum, derivatives, numbers, value
 from piazzi.outside.pieces import ROUNDING, Pieces, pieces_of
 from piazzi.outside.samples import read_columns
+from piazzi.text import brief
 
 Array = np.ndarray[Any, Any]
 TERMS = 12
@@ -43,6 +44,8 @@ class Table:
     values: Any
     error: Any = None
     terms: int = TERMS
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         t, v = numbers(self.times, "times of a table"), numbers(self.values, "values of a table")

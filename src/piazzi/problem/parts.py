@@ -10,6 +10,7 @@ import numpy as np
 
 from piazzi.kernels import Integrator
 from piazzi.problem.checks import Array, Locked, numeric
+from piazzi.text import brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +22,8 @@ class Gaussian(Locked):
 
     mean: Any
     covariance: Any
+
+    __repr__ = brief
 
     @classmethod
     def from_sigma(cls, mean: Any, sigma: Any) -> Gaussian:
@@ -49,6 +52,8 @@ class ProcessNoise(Locked):
     method: Literal["integral", "scaled"] = "integral"
     axes: Literal["states", "orbit"] = "states"
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         for what, valid in (("per", ("second", "step")), ("method", ("integral", "scaled")), ("axes", ("states", "orbit"))):
             if getattr(self, what) not in valid:
@@ -74,6 +79,8 @@ class Schedule:
     every: float | None = None
     start: float | None = None
     until: float | None = None
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         for what in ("every", "start", "until"):
@@ -122,6 +129,8 @@ class Station(Locked):
     schedule: Schedule | None = None
     place: Any = None
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True, eq=False)
 class Manoeuvre:
@@ -144,6 +153,8 @@ class Manoeuvre:
     delta_v: Any
     covariance: Any = None
     states: str | Sequence[str] = "velocity"
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,3 +201,5 @@ class Truth:
     functions: Mapping[str, Any] = field(default_factory=dict)
     stations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     places: Mapping[str, Any] = field(default_factory=dict)
+
+    __repr__ = brief

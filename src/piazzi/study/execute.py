@@ -21,6 +21,7 @@ from piazzi.study.runner import Progress, Runner
 from piazzi.study.store import Stored, read_store
 from piazzi.study.storing import write_store
 from piazzi.study.versions import fingerprint
+from piazzi.text import brief
 
 
 class Study(Plan):
@@ -46,6 +47,8 @@ class Study(Plan):
     ValueError
         For unknown names (with the nearest), values that do not fit, or a grid beyond reason.
     """
+
+    __repr__ = brief
 
     @classmethod
     def of(cls, scenario: str | os.PathLike[str], **changes: Any) -> Study:

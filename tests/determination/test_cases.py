@@ -1,0 +1,26 @@
+"""Cases that come with the package: each has its tracking, and is what its first line says."""
+
+import pytest
+
+import piazzi as pz
+from piazzi.determination.case_file import CASES, names, split
+
+
+def test_every_case_has_its_tracking_and_says_how_it_is_run():
+    assert names() == ["ceres-1801", "lageos-2"]
+    for name in names():
+        files, case = split([name])
+        assert len(files) == 1 and len(pz.read_tracking(files[0], sigma=case.answers.get("sigma"))) > 30
+        assert f"`piazzi determine {name}` runs it." in (CASES / f"{name}.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_lasers_determine_lageos_2():
+    """Half a metre from the state that another laboratory published for 16:00 on 13 February (EME2000, here to 0.7 m)."""
+    import numpy as np
+
+    found = pz.determine("lageos-2")
+    assert found.determined and found.keep.all() and len(found.keep) == 95
+    assert found.weighted_rms < 1.0
+    state = found.orbit.to("EME2000").at(pz.Epoch("2016-02-13T16:00:00 UTC"))
+    assert np.linalg.norm(state[:3] - [7526994.072, -9646309.832, 1464110.239]) < 0.7
