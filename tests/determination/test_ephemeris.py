@@ -24,6 +24,13 @@ SITE = earth.Station.geodetic("SITE", 0.6, 0.3, 100.0, mask=0.2)
 SECOND = 1e-6  # rad: of directions below
 
 
+def test_an_orbit_as_text_is_called_what_the_command_calls_it():
+    with pytest.raises(ValueError, match=r"^ORBIT: of which date is it"):
+        course_of("a=7078km", EPOCH)
+    with pytest.raises(ValueError, match=r"^ORBIT has no e, i, raan, argp"):
+        course_of("a=7078km nu=1deg epoch=2026-11-03T04:12:00Z", EPOCH)
+
+
 # ---- without kernels -------------------------------------------------------------------------------------------------
 
 

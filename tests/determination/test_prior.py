@@ -55,7 +55,7 @@ def test_what_was_used_is_left_out_and_counted(chain):
 def test_every_file_with_a_covariance_is_a_prior(chain, noisy, tmp_path):
     _, first, then = chain
     rows = observations(noisy, T, SIGMA)
-    for name in ("first.json", "first.nc"):
+    for name in ("first.json", "first.nc", "first.ocm"):  # an OCM says which measurements it was made of
         first.write(tmp_path / name)
         again = pz.determine(rows, forces=KNOWN, prior=tmp_path / name)
         assert sigmas_apart(then, again, then.epoch) < 1e-3, name

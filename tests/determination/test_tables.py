@@ -54,12 +54,25 @@ def test_what_the_table_does_not_say_is_asked_for(table, capsys, left, asked):
     assert asked in capsys.readouterr().err
 
 
+def test_the_table_says_its_axes_and_frame_those_of_the_answer(table):
+    """Axes that a file names leave ``--frame`` to the answer; where it names none, it says them, not the answer's."""
+    from piazzi.determination import determining
+
+    told = {"columns": COLUMNS, "scale": "GPS", "sigma": "0.1m", "frame": "ITRF"}
+    silent = determining._observations([str(table)], told)
+    assert silent.segments[0].frame == "ITRF" and any("not those of the answer" in text for text in silent.assumed)
+    table.write_text("# frame = ITRF\n" + table.read_text())
+    named = determining._observations([str(table)], told | {"frame": "EME2000"})
+    assert named.segments[0].frame == "ITRF" and not any("--frame" in text for text in named.assumed)
+
+
 @pytest.mark.slow
 def test_the_same_orbit_by_the_command(sp3, table, capsys):
     words = ["--columns", COLUMNS, "--scale", "GPS", "--frame", "ITRF", "--sigma", "0.064m", "--json"]
     assert main(["determine", str(table), *words]) in (0, 3)
     found = json.loads(capsys.readouterr().out)
-    other = document(pz.determine(thinned(sp3), frame="ITRF"))
+    other = document(pz.determine(thinned(sp3)))
+    assert any("--frame ITRF names the axes of measurements" in text for text in found["assumed"])
     assert (found["frame"], found["epoch"]) == (other["frame"], other["epoch"]) and found["determined"] == other["determined"]
     np.testing.assert_allclose(found["mean"][:3], other["mean"][:3], rtol=0, atol=1e-2)
     np.testing.assert_allclose(found["sigma"][:6], other["sigma"][:6], rtol=1e-6)

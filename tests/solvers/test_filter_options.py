@@ -304,3 +304,58 @@ def test_guarded_checkpoint_resumes_in_the_middle_of_an_epoch(outliers):
 def test_bad_options_are_refused(settings, message):
     with pytest.raises(ValueError, match=message):
         pz.ExtendedKalmanFilter(**settings)
+
+
+# ---- a gate that was wrong -------------------------------------------------------------------------------------------
+
+
+def lost_walk(runs=400, jump=200, seed=5):
+    """A constant that jumps by a thousand sigma, which the model does not know: from then on every good row is an outlier."""
+    rng = np.random.default_rng(seed)
+    prior = pz.Gaussian(np.zeros(1), np.eye(1))
+    problem = linear(np.eye(1), [np.eye(1)], [np.eye(1)], 1e-2 * np.eye(1), prior)
+    values = np.where(np.arange(runs) < jump, 0.0, 1000.0) + rng.standard_normal(runs)
+    return problem, pz.Tracking(np.arange(float(runs)), values[:, None], [problem.stations[0].name] * runs)
+
+
+@pytest.mark.usefixtures("uncompiled")
+@pytest.mark.parametrize(
+    "filter_",
+    [pz.ExtendedKalmanFilter(gate=0.999), pz.SquareRootKalmanFilter(gate=0.999), pz.UnscentedKalmanFilter(gate=0.999)],
+)
+def test_five_rejected_in_a_row_open_the_gate_until_a_row_lies_within(filter_):
+    """As written here with numbers: rejected while fewer than five before were, taken from then on, and shut by a good row."""
+    problem, tracking = lost_walk()
+    limit, m, P, streak, means, codes = 3.290526731491895**2, 0.0, 1.0, 0, [], []
+    Q = float(np.ravel(problem.process_noise.covariance)[0])
+    for k, z in enumerate(tracking.values[:, 0].tolist()):
+        P = P + Q if k else P
+        within = (z - m) ** 2 / (P + 1.0) <= limit
+        streak = 0 if within else streak + 1
+        codes.append(0 if within else 2 if streak > 5 else 1)
+        if codes[-1] != 1:
+            K = P / (P + 1.0)
+            m, P = m + K * (z - m), (1.0 - K) * P
+        means.append(m)
+    found = filter_.estimate(problem, tracking)
+    assert_allclose(found.mean[:, 0], means, rtol=1e-9, atol=1e-9)
+    assert_array_equal(found.details["rejected"], np.array(codes) == 1)
+    assert_array_equal(found.details["reopened"], np.array(codes) == 2)
+    assert codes[200:206] == [1, 1, 1, 1, 1, 2] and abs(m - 1000.0) < 1.0 and codes[-20:].count(0) >= 19
+    assert found.success and "five rows in a row were beyond the gate, which was opened at t = 205 s" in found.message
+
+
+@pytest.mark.usefixtures("uncompiled")
+@pytest.mark.parametrize("filter_", [pz.ExtendedKalmanFilter(gate=0.999), pz.SquareRootKalmanFilter(gate=0.999)])
+def test_a_live_filter_opens_its_gate_where_the_run_does_and_goes_on_from_a_checkpoint(filter_):
+    problem, tracking = lost_walk(230)
+    whole = filter_.estimate(problem, tracking)
+    live, told = filter_.start(problem), []
+    for k, (t, z) in enumerate(zip(tracking.row_times, tracking.values, strict=True)):
+        if k == 203:
+            live, before = filter_.start(problem), live.checkpoint()
+            live.restore(before)
+        live.update(str(tracking.row_stations[k]), z, t)
+        told.append((live.rejected, live.reopened))
+    assert_allclose(live.mean, whole.mean[-1], rtol=0, atol=1e-12)
+    assert_array_equal(np.array(told), np.column_stack([whole.details["rejected"], whole.details["reopened"]]))

@@ -13,7 +13,7 @@ _OPTIONS: tuple[tuple[str, str, str, bool], ...] = (
     ("range", "WAY", "What ranges are: one-way, two-way (half of the way there and back), round-trip or three-way.", False),
     ("angles", "KIND", "What directions are: astrometric, geocentric or apparent.", False),
     ("tag", "EVENT", "What times are of: transmit, bounce or receive.", False),
-    ("frame", "AXES", "Axes of directions and fixes: EME2000, ITRF, ...", False),
+    ("frame", "AXES", "Axes of measurements whose file names none, as ITRF; of the answer where every file does.", False),
     ("corrections", "STATE", "Whether corrections of the file are applied or open.", False),
     ("interval", "SECONDS", "Over which range rates are averaged.", False),
     ("interval-reference", "PART", "Of that interval, what times are of: start, middle or end.", False),

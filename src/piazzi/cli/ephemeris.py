@@ -54,8 +54,8 @@ def command(
 ) -> int:
     """Show where and when ORBIT is seen from a station.
 
-    ORBIT is a determination (.json, .nc), a file (OEM, OPM, SP3, CPF, two-line
-    elements, OMM), elements or a state as text. Rows are dated at the reception:
+    ORBIT is a determination (.json, .nc), a file (OEM, OPM, OCM, SP3, CPF,
+    two-line elements, OMM), elements or a state as text. Rows are dated at the reception:
     right ascension and declination, azimuth and elevation without refraction,
     range, range-rate, motion on the sky, elevation of the Sun, shadow, and where
     the orbit has a covariance the ellipse of three sigma on the sky and the sigma

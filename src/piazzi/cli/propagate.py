@@ -38,7 +38,7 @@ def command(
 ) -> int:
     """Propagate ORBIT to other times, with its covariance.
 
-    ORBIT is a file of an orbit (OEM, OPM, SP3, CPF, two-line elements, OMM) or a scenario. Of several states the last with a
+    ORBIT is a file of an orbit (OEM, OPM, OCM, SP3, CPF, TLE, OMM) or a scenario. Of several states the last with a
     covariance is taken, or the one nearest to --from. Forces are chosen by the orbit's height and said, unless --forces names
     them: words such as "gravity=EGM2008 degree=40 drag=exponential cd_a_m=0.02", behind "default" where they change that.
     A scenario has forces, process noise and a prior of its own.

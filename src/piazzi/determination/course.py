@@ -72,7 +72,7 @@ def course_of(given: Any, near: Epoch, *, chosen: str | None = None, forces: Any
 
     Parameters
     ----------
-    given : a `Determination`, its JSON or .nc, a file (OEM, OPM, SP3, CPF, TLE, OMM), an ephemeris, elements or a state as text
+    given : a `Determination`, its JSON or .nc, a file (OEM, OPM, OCM, SP3, CPF, TLE, OMM), an ephemeris, text of an orbit
     near : a date by which one of several states is taken
     chosen : name of the object in a file of several
     forces : of an orbit that is given by one state, as `determine` takes them; default by height
@@ -89,8 +89,8 @@ def course_of(given: Any, near: Epoch, *, chosen: str | None = None, forces: Any
     if isinstance(given, Mapping):
         return _of_document(given, "the determination")
     if isinstance(given, Guess) or (isinstance(given, str) and "=" in given and not os.path.exists(given)):
-        guess = guess_of(given, near)
-        return _of_state("", guess.epoch, guess.state, None, guess.source.removeprefix("--"), forces, guess.assumed)
+        guess = guess_of(given, near, where="ORBIT")
+        return _of_state("", guess.epoch, guess.state, None, guess.source, forces, guess.assumed)
     if isinstance(given, (str, os.PathLike)):
         facts = _document(os.fspath(given))
         if facts is not None:

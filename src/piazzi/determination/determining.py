@@ -40,11 +40,14 @@ from piazzi.earth.dates import read_date
 from piazzi.earth.rotation import frame_named
 from piazzi.estimate.ahead import compile_for
 from piazzi.estimate.estimator import Estimate, Estimator
-from piazzi.formats import Observations, concatenate, read_tracking
+from piazzi.formats import Conventions, Observations, concatenate, read_tracking
+from piazzi.formats.conventions import with_conventions
 from piazzi.problem.checks import Array
 
 SOURCES = (str, os.PathLike)
 INSTRUMENTS = (BIAS, SCALE, CLOCK)
+_OF_ROWS = "--frame {} names the axes of measurements whose file names none, and so not those of the answer"
+GATE = "beyond the gate"
 ROUNDS = 4  # of the answer, while rows are left out or taken back
 
 
@@ -77,10 +80,10 @@ def determine(
     ----------
     tracking : files, or `Observations`, put together; a file ``.toml`` among them is a case, which the words override
     guess : where to begin: text, ``"a=7078km e=0.001 i=98.2deg raan=10deg argp=0deg nu=0deg epoch=2026-11-03T04:12:00Z"``
-        or ``"x=7000km ... vz=7.5km/s epoch=..."``; a file (OEM, OPM, TLE, OMM, SP3, CPF, an earlier determination's JSON); a
+        or ``"x=7000km ... vz=7.5km/s epoch=..."``; a file (OEM, OPM, OCM, TLE, OMM, SP3, CPF, a determination's JSON); a
         `Guess`.  None, or "none": all orbits that fit are looked for.
-    prior : an orbit of before whose covariance is taken too: a determination, its JSON or .nc, an OEM or OPM with covariances,
-        two-line elements; measurements that it has used already are left out
+    prior : an orbit of before whose covariance is taken too: a determination, its JSON or .nc, an OEM, OPM or OCM with
+        covariances, two-line elements; measurements that it has used already are left out
     from_ : date from which on measurements are new to that prior, where it does not say it
     stations : files, `earth.Station` objects or a `StationList`; "ilrs" are those of the package
     with_ : estimators, as the command line writes them; the first is the answer.  Default the graph.
@@ -91,7 +94,8 @@ def determine(
     manoeuvre : text such as ``"2026-11-03T04:12:00Z dv=0,0.3,0m/s axes=RTN sigma=0.05m/s for=600s"``, files (CSV, OPM, OCM)
     mass, area, com : kg, m2; and what a range is shorter by than to the centre of mass, m
     epoch : where the answer stands; default the last measurement
-    frame : axes of the answer, default GCRF, about the Sun ICRF; and of fixes whose file does not say them
+    frame : axes of measurements whose file names none; where every file does, those of the answer, which are else the GCRF,
+        about the Sun the ICRF
     about : "earth" or "sun"; default the Sun where directions fit no orbit about the Earth
     object : name of what to determine, in files of several
     hold : rows to predict without them: "last", "passes" (each in turn), or a share such as "1/4"; default each pass where
@@ -125,6 +129,7 @@ def determined(
     axes = frame_named(case.frame) if case.frame else None
     say("reading")
     given = prepared(*tracking, case=case)
+    axes = None if _OF_ROWS.format(case.frame) in given.assumed else axes
     say("approaching")
     centre = given.measured.centre
     return solved(
@@ -273,12 +278,22 @@ def _answered(given: Setup, estimator: Estimator) -> tuple[Array, Array, Estimat
         answer = estimate(given, estimator, keep)
         analysis = _analysis_at(given, answer.mean) if answer.view == "delayed" else first
         if analysis is None or robust or answer.view != "delayed":
-            break
+            return *_gated(answer, keep, reasons), answer, analysis
         again, why = edited(given, analysis, keep)
         if not left or (again == keep).all():
             break
         keep, reasons = again, why
     return keep, reasons, answer, analysis
+
+
+def _gated(answer: Estimate, keep: Array, reasons: Array) -> tuple[Array, Array]:
+    """Which rows are kept, and why not the others, with those that a filter's gate rejected."""
+    rejected = answer.details.get("rejected")
+    if rejected is None or not np.any(rejected):
+        return keep, reasons
+    own = np.asarray(rejected, dtype=np.bool_) & keep
+    reasons = np.where(own, GATE, reasons)
+    return keep & ~own, reasons
 
 
 def _analysis_at(given: Setup, states: Array) -> Analysis | None:
@@ -298,7 +313,17 @@ def _observations(tracking: Sequence[Any], told: Mapping[str, Any]) -> Observati
     for one in ready:
         if not isinstance(one, Observations):
             raise ValueError(f"tracking is a file or Observations, not a {type(one).__name__}")
-    return concatenate([*([read_tracking(*paths, **told)] if paths else []), *ready])
+    return concatenate([*([_of_files(paths, told)] if paths else []), *ready])
+
+
+def _of_files(paths: Sequence[Any], told: Mapping[str, Any]) -> Observations:
+    """Measurements of files; `frame` is said of theirs where one of them names no axes, as is told then."""
+    frame = told.get("frame")
+    rows = read_tracking(*paths, **{name: value for name, value in told.items() if name != "frame"})
+    if frame is None or not any("--frame" in text for text in rows.open):
+        return rows
+    named = with_conventions(rows, Conventions.of(frame=frame))
+    return replace(named, assumed=(*named.assumed, _OF_ROWS.format(frame)))
 
 
 def _instant(epoch: Any) -> tuple[str | None, Epoch | None]:

@@ -61,7 +61,7 @@ def earlier_of(given: Any, near: Epoch, chosen: str | None = None) -> Earlier:
 
     Parameters
     ----------
-    given : a determination, its JSON or .nc; an OEM or OPM with covariances, two-line elements, or an `Ephemeris` of one
+    given : a determination, its JSON or .nc; an OEM, OPM or OCM with covariances, two-line elements, or an `Ephemeris` of one
     near : the first measurement; of many states with a covariance the one that is nearest
     chosen : name of the object, in a file of several
 
@@ -82,7 +82,7 @@ def earlier_of(given: Any, near: Epoch, chosen: str | None = None) -> Earlier:
     if start.covariance is None:
         raise ValueError(f"--prior {name}: {start.source} has no covariance: it can be a --guess, no prior")
     thumb = (f"the covariance of {name} is a rule of thumb, 1 km",) if "rule of thumb" in start.source else ()
-    return Earlier(start.epoch, start.state, start.covariance, name, assumed=thumb)
+    return Earlier(start.epoch, start.state, start.covariance, name, used=start.used, assumed=thumb)
 
 
 def _facts_of(path: str | os.PathLike[str]) -> Mapping[str, Any] | None:

@@ -156,7 +156,7 @@ def ephemeris(
 
     Parameters
     ----------
-    orbit : a `Determination`, its JSON or .nc; a file (OEM, OPM, SP3, CPF, TLE, OMM); elements or a state as text
+    orbit : a `Determination`, its JSON or .nc; a file (OEM, OPM, OCM, SP3, CPF, TLE, OMM); elements or a state as text
     station : its name, an `earth.Station`, or ``"lat=50.1deg lon=8.6deg height=100m"``
     when : "tonight" (the Sun 6 degrees down, from `now`), ``"A .. B"``, ``"A .. +6h"``, a date, or two of them
     step : between rows, seconds or such as "30s"

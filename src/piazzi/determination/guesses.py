@@ -72,7 +72,7 @@ class Guess:
         return np.concatenate([self.position, self.velocity])
 
 
-def guess_of(given: Any, near: Epoch, chosen: str | None = None, about: str = "earth") -> Guess:
+def guess_of(given: Any, near: Epoch, chosen: str | None = None, about: str = "earth", where: str = "--guess") -> Guess:
     """The guess that a user gives: text, a path, a `Guess`, an ephemeris, or what has a ``to_dict`` of a determination.
 
     Parameters
@@ -81,6 +81,7 @@ def guess_of(given: Any, near: Epoch, chosen: str | None = None, about: str = "e
     near : the first measurement; of a file with many states the one there, or the nearest
     chosen : name of the object in a file of several
     about : what elements and states of text are about
+    where : what messages call the text
 
     Raises
     ------
@@ -98,47 +99,48 @@ def guess_of(given: Any, near: Epoch, chosen: str | None = None, about: str = "e
     if isinstance(given, (Ephemeris, Arc, MeanElements)):
         return _of_orbit(given, near, chosen, "guess", about)
     text = os.fspath(given)
-    return _of_text(text, about) if "=" in text and not os.path.exists(text) else _of_file(text, near, chosen, about)
+    return _of_text(text, about, where) if "=" in text and not os.path.exists(text) else _of_file(text, near, chosen, about)
 
 
-def _of_text(text: str, about: str) -> Guess:
+def _of_text(text: str, about: str, where: str) -> Guess:
     known = (*ELEMENTS, *ANOMALIES, *CARTESIAN, "epoch", "frame")
-    found = pairs(text, "--guess", known, f'"{EXAMPLE}"')
+    found = pairs(text, where, known, f'"{EXAMPLE}"')
     cartesian, elements = [n for n in CARTESIAN if n in found], [n for n in (*ELEMENTS, *ANOMALIES) if n in found]
     if cartesian and elements:
-        raise ValueError(f"--guess has both {cartesian[0]} and {elements[0]}: give a state or elements, not both")
+        raise ValueError(f"{where} has both {cartesian[0]} and {elements[0]}: give a state or elements, not both")
     if "epoch" not in found:
-        raise ValueError("--guess: of which date is it? Add such as epoch=2026-11-03T04:12:00Z")
-    epoch = date(found["epoch"], "--guess: epoch")
+        raise ValueError(f"{where}: of which date is it? Add such as epoch=2026-11-03T04:12:00Z")
+    epoch = date(found["epoch"], f"{where}: epoch")
     frame = frame_named(found.get("frame", "GCRF"))
     if cartesian:
-        _complete(cartesian, tuple(CARTESIAN))
-        values = np.array([quantity(found[n], unit, f"--guess: {n}") for n, unit in CARTESIAN.items()])
+        _complete(cartesian, tuple(CARTESIAN), where)
+        values = np.array([quantity(found[n], unit, f"{where}: {n}") for n, unit in CARTESIAN.items()])
         r, v = values[:3], values[3:]
     else:
-        r, v = _of_elements(found, centre_of(about).mu)
-    assumed = () if "frame" in found else (f"the guess is in the {centre_of(about).frame} (frame=...)",)
+        r, v = _of_elements(found, centre_of(about).mu, where)
+    who = "the guess" if where == "--guess" else where
+    assumed = () if "frame" in found else (f"{who} is in the {centre_of(about).frame} (frame=...)",)
     r, turned = transform(r, v, frame, "GCRF", epoch)
-    return Guess(epoch, r, np.asarray(turned), "--guess", assumed, about=about)
+    return Guess(epoch, r, np.asarray(turned), where, assumed, about=about)
 
 
-def _of_elements(found: Mapping[str, str], mu: float) -> tuple[Array, Array]:
-    _complete([n for n in ELEMENTS if n in found], ELEMENTS)
+def _of_elements(found: Mapping[str, str], mu: float, where: str) -> tuple[Array, Array]:
+    _complete([n for n in ELEMENTS if n in found], ELEMENTS, where)
     anomalies = [n for n in ANOMALIES if n in found]
     if len(anomalies) != 1:
-        raise ValueError(f"--guess has {' and '.join(anomalies) or 'no anomaly'}: give one of nu, E and M")
+        raise ValueError(f"{where} has {' and '.join(anomalies) or 'no anomaly'}: give one of nu, E and M")
     units = ("m", "", "deg", "deg", "deg", "deg")
-    values = [quantity(found[n], u, f"--guess: {n}") for n, u in zip((*ELEMENTS, anomalies[0]), units, strict=True)]
+    values = [quantity(found[n], u, f"{where}: {n}") for n, u in zip((*ELEMENTS, anomalies[0]), units, strict=True)]
     try:
         return Keplerian(anomaly=ANOMALIES[anomalies[0]]).to_state(np.array(values), mu)
     except ValueError as error:
-        raise ValueError(f"--guess is no orbit: {error}") from None
+        raise ValueError(f"{where} is no orbit: {error}") from None
 
 
-def _complete(have: list[str], wanted: tuple[str, ...]) -> None:
+def _complete(have: list[str], wanted: tuple[str, ...], where: str) -> None:
     missing = [n for n in wanted if n not in have]
     if missing:
-        raise ValueError(f'--guess has no {", ".join(missing)}: write such as "{EXAMPLE}"')
+        raise ValueError(f'{where} has no {", ".join(missing)}: write such as "{EXAMPLE}"')
 
 
 def _of_file(path: str, near: Epoch, chosen: str | None, about: str) -> Guess:

@@ -102,6 +102,11 @@ def block(found: Any) -> dict[str, object]:
         "SENSORS_N": len({one["station"] for one in facts["residuals"]}),
         "SENSORS": ",".join(dict.fromkeys(printable(one["station"]) for one in facts["residuals"])),
     }  # fmt: skip
+    ends = [facts["span"][key] for key in ("first", "last")]
+    if None not in ends:
+        first, last = ((found.epoch - Epoch(text)) / 86400.0 for text in ends)
+        out |= {"DAYS_SINCE_FIRST_OBS": first, "DAYS_SINCE_LAST_OBS": last, "ACTUAL_OD_SPAN": first - last}
+    out["DATA_TYPES"] = ",".join(dict.fromkeys(printable(one["component"]) for one in facts["residuals"]))
     if found.weighted_rms is not None:
         out["WEIGHTED_RMS"] = float(found.weighted_rms)
     if facts["considered"]:

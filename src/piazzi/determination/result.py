@@ -100,7 +100,9 @@ class Determination:
     def message(self) -> str:
         """What the estimator says, or which sentence of the verdict is false."""
         wrong = [s.sentence for s in self.verdict.values() if s.ok is False]
-        return self.estimate.message or (wrong[0] if wrong else "")
+        if not (self.success and wrong):
+            return self.estimate.message
+        return "; ".join(text for text in (wrong[0], self.estimate.message) if text)
 
     @cached_property
     def orbit(self) -> Orbit:

@@ -15,9 +15,11 @@ from piazzi.estimate.live import LiveFilter, checked_measurement
 from piazzi.estimate.saved import Saved
 from piazzi.kernels import KernelSpec
 from piazzi.kernels.bundle import Beliefs, Gate, Innovations
-from piazzi.problem import Problem
+from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, frozen
 from piazzi.problem.inputs import Inputs, epoch_alone, measured_by
+
+REOPENED = "five rows in a row were beyond the gate, which was opened"
 
 
 def check_gate(gate: float | None) -> None:
@@ -39,8 +41,29 @@ class Guard:
 
     def bundle(self, rows: int, width: int) -> Gate:
         """The same for kernels, with nothing rejected so far."""
-        limits, rejected = self.thresholds(width), np.zeros(rows, dtype=np.int64)
-        return Gate(iterations=self.iterations, limits=limits, rejected=rejected)
+        return gate_bundle(self.iterations, self.thresholds(width), rows)
+
+
+def gate_bundle(iterations: int, limits: Array, rows: int, streak: int = 0) -> Gate:
+    """A gate that has rejected the last `streak` rows, and none of the `rows` to come."""
+    before, rejected = np.array([streak], dtype=np.int64), np.zeros(rows, dtype=np.int64)
+    return Gate(iterations=iterations, limits=limits, streak=before, rejected=rejected)
+
+
+def gate_details(gate: Gate, tracking: Tracking) -> dict[str, Any]:
+    """What a run's gate did: rows rejected, and where it was opened because as many as five in a row were beyond it."""
+    out, opened = gate.rejected == 1, gate.rejected == 2
+    out.setflags(write=False)
+    details: dict[str, Any] = {"rejected": out, "rejected_count": int(out.sum())}
+    if opened.any():
+        opened.setflags(write=False)
+        first = np.flatnonzero(opened & ~np.append(False, opened[:-1]))
+        again = f" and {len(first) - 1} times later" if len(first) > 1 else ""
+        details["reopened"] = opened
+        details["remark"] = (
+            f"{REOPENED} at t = {tracking.row_times[first[0]]:g} s{again}: {int(opened.sum()):,} rows were taken so"
+        )
+    return details
 
 
 @lru_cache(maxsize=100)
@@ -48,14 +71,14 @@ def _thresholds(gate: float | None, width: int) -> Array:
     return frozen([np.inf, *(np.inf if gate is None else quantile(gate, m) for m in range(1, width + 1))])
 
 
-def guarded_run(problem: Problem, inputs: Inputs, fragments: tuple[str, ...], guard: Guard) -> tuple[Array, ...]:
-    """Means (K, n), covariances (K, n, n), innovations (J, m) with theirs (J, m, m), and 1 for each row rejected, (J,)."""
+def guarded_run(problem: Problem, inputs: Inputs, fragments: tuple[str, ...], guard: Guard) -> tuple[Any, ...]:
+    """Means (K, n), covariances (K, n, n), innovations (J, m) with theirs (J, m, m), and the gate as the run left it."""
     library = kernels.load(guarded_spec(problem, fragments))
     K, n, (J, m) = inputs.epochs, problem.model.n, inputs.z.shape
     beliefs, innovations = Beliefs.empty(K=K, N=n), Innovations.empty(J=J, M=m)
     gate = guard.bundle(J, m)
     library.run_guarded_filter(*inputs.bundles(problem), gate, beliefs, innovations)
-    return (*beliefs.members, *innovations.members, gate.rejected)
+    return (*beliefs.members, *innovations.members, gate)
 
 
 def guarded_spec(problem: Problem, fragments: tuple[str, ...]) -> KernelSpec:
@@ -68,12 +91,12 @@ class GuardedLiveFilter(LiveFilter):
 
     Attributes
     ----------
-    rejected : bool
-        Whether the gate rejected the last measurement.
+    rejected, reopened : bool
+        Whether the gate rejected the last measurement; or took one beyond it, because it had rejected five in a row.
     """
 
-    _shown: ClassVar[tuple[str, ...]] = (*LiveFilter._shown, "rejected")
-    saved_names: ClassVar[tuple[str, ...]] = (*LiveFilter.saved_names, "epoch_values", "epoch_stations")
+    _shown: ClassVar[tuple[str, ...]] = (*LiveFilter._shown, "rejected", "reopened")
+    saved_names: ClassVar[tuple[str, ...]] = (*LiveFilter.saved_names, "epoch_values", "epoch_stations", "streak")
 
     def __init__(self, problem: Problem, fragments: tuple[str, ...], guard: Guard) -> None:
         super().__init__(problem, fragments)
@@ -82,13 +105,15 @@ class GuardedLiveFilter(LiveFilter):
         self._library = kernels.load(problem.spec(*parts))
         self._settings, self._guard = (fragments, guard), guard
         self._values, self._rows_of = np.empty((0, m)), np.empty(0, dtype=np.int64)
-        self.rejected = False
+        self.rejected = self.reopened = False
+        self._streak = np.zeros(2, dtype=np.int64)  # rows rejected in a row, before this epoch and now
 
     def predict(self, t: float) -> None:
         before = self._predicted_to
         super().predict(t)
         if t != before:
             self._values, self._rows_of = self._values[:0], self._rows_of[:0]
+            self._streak[0] = self._streak[1]
 
     def update(self, station: str, z: Any, t: float | None = None) -> None:
         s = checked_measurement(self.problem, self._stations, station, z, self._row[0])
@@ -101,7 +126,8 @@ class GuardedLiveFilter(LiveFilter):
         self._values = np.vstack([self._values, self._row])
         self._rows_of = np.append(self._rows_of, np.int64(s))
         rows, m = self._values.shape
-        gate, innovations = self._guard.bundle(rows, m), Innovations.empty(J=rows, M=m)
+        gate = gate_bundle(self._guard.iterations, self._guard.thresholds(m), rows, int(self._streak[0]))
+        innovations = Innovations.empty(J=rows, M=m)
         self._library.live_update_guarded(
             epoch_alone(self.problem, float(self._times[3]), rows),
             self.problem.given_bundle,
@@ -113,17 +139,32 @@ class GuardedLiveFilter(LiveFilter):
             self.widest,
         )
         self.innovation[:], self.innovation_covariance[:] = innovations.nu[-1], innovations.S[-1]
-        self.rejected, self._measured = bool(gate.rejected[-1]), True
+        self._streak[1], self._measured = gate.streak[0], True
+        self.rejected, self.reopened = bool(gate.rejected[-1] == 1), bool(gate.rejected[-1] == 2)
         if self._has_roots:
             self._look_for_root(s, float(self._times[3]))
 
     def _saved_state(self) -> dict[str, Array]:
-        return super()._saved_state() | {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
+        own = {
+            "epoch_values": self._values.copy(),
+            "epoch_stations": self._rows_of.copy(),
+            "streak": self._streak.astype(float),
+        }
+        return super()._saved_state() | own
 
     def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
         values, rows_of = Saved(saved, self.problem).measurements("epoch_values", "epoch_stations")
-        return super()._checked(saved) | {"epoch_values": values, "epoch_stations": rows_of}
+        return super()._checked(saved) | {"epoch_values": values, "epoch_stations": rows_of, "streak": checked_streak(saved)}
 
     def _set_state(self, kept: Mapping[str, Array]) -> None:
         super()._set_state(kept)
         self._values, self._rows_of = kept["epoch_values"], kept["epoch_stations"]
+        self._streak[:] = kept["streak"]
+
+
+def checked_streak(saved: Mapping[str, Array]) -> Array:
+    """Rows that a gate rejected in a row, before an epoch and with it, of a checkpoint: none in those of earlier versions."""
+    found = np.asarray(saved.get("streak", np.zeros(2)), dtype=float)
+    if found.shape != (2,) or not (np.isfinite(found).all() and (found >= 0).all() and (found == np.floor(found)).all()):
+        raise ValueError(f"the checkpoint's 'streak' is {found.tolist()}; it must be two counts")
+    return np.asarray(np.minimum(found, 2.0**31), dtype=np.int64)

@@ -14,7 +14,7 @@ from piazzi import kernels
 from piazzi.estimate.considered import with_considered
 from piazzi.estimate.estimator import Estimate, Stopwatch
 from piazzi.estimate.gradients import told_of
-from piazzi.estimate.guarded import Guard, GuardedLiveFilter, check_gate, guarded_run
+from piazzi.estimate.guarded import Guard, GuardedLiveFilter, check_gate, gate_details, guarded_run
 from piazzi.estimate.live import LiveFilter
 from piazzi.estimate.root import linear_root, root_estimate
 from piazzi.estimate.soundness import check_start
@@ -51,6 +51,8 @@ class ExtendedKalmanFilter:
     gate : float, optional
         Probability that a good measurement passes, such as 0.999.  A row whose nu^T S^-1 nu at the prediction lies beyond that
         quantile of chi-square is left out; ``details["rejected"]`` marks such rows, ``details["rejected_count"]`` counts them.
+        After five such rows in a row the belief is doubted instead: the gate is open until a row lies within it again, which
+        `message` and ``details["reopened"]`` say.
         Default: every row is taken.
 
     Notes
@@ -100,15 +102,13 @@ class ExtendedKalmanFilter:
                 return Estimate(problem, tracking, mean, P, nu, S, len(mean), seconds)
             return self._in_root_form(problem, tracking)
         watch = Stopwatch()
-        mean, P, nu, S, rejected = guarded_run(problem, inputs, update_fragments(problem, self.update), guard)
+        mean, P, nu, S, gate = guarded_run(problem, inputs, update_fragments(problem, self.update), guard)
         seconds = watch.seconds()
         check_start(problem, inputs, mean[0])
         wide = too_wide(problem, inputs, S)
         if wide and self.iterations == 1:
             return self._in_root_form(problem, tracking)
-        out = rejected.astype(bool)
-        out.setflags(write=False)
-        details = {} if self.gate is None else {"rejected": out, "rejected_count": int(out.sum())}
+        details = {} if self.gate is None else gate_details(gate, tracking)
         failure = f"{TOO_WIDE} beside the noise of the measurements: take one iteration per epoch" if wide else ""
         steps = inputs.epochs * guard.iterations
         return Estimate(problem, tracking, mean, P, nu, S, steps, seconds, details=details, failure=failure)

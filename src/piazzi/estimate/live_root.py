@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from piazzi.estimate.guarded import checked_streak
 from piazzi.estimate.live import Clock, checked_measurement, clock_times
 from piazzi.estimate.root import Results, Root, RootKernel
 from piazzi.estimate.saved import Saved
@@ -50,13 +51,13 @@ class LiveRootFilter(Session):
     mean, covariance : (n,), (n, n)
         The current belief: predicted, or updated.
     innovation, innovation_covariance : (m,), (m, m), of the last update
-    rejected : whether the gate rejected the last measurement
+    rejected, reopened : whether the gate rejected the last measurement, or took it though beyond, being open
     success, message : whether the belief is finite with a semidefinite covariance; else why not
     """
 
-    _shown: ClassVar[tuple[str, ...]] = (*Session._shown, "rejected")
+    _shown: ClassVar[tuple[str, ...]] = (*Session._shown, "rejected", "reopened")
     _arrays: ClassVar[tuple[str, ...]] = ("base_mean", "base_root", "root", "mean", "covariance")
-    saved_names: ClassVar[tuple[str, ...]] = (*_arrays, "epoch_values", "epoch_stations", "clock")
+    saved_names: ClassVar[tuple[str, ...]] = (*_arrays, "epoch_values", "epoch_stations", "streak", "clock")
 
     def __init__(self, problem: Problem, root: Root) -> None:
         self.problem, self._settings = problem, (root,)
@@ -66,7 +67,8 @@ class LiveRootFilter(Session):
         m = problem.model.width
         self.mean, self.covariance = problem.mean.copy(), problem.covariance.copy()
         self.innovation, self.innovation_covariance = np.full(m, np.nan), np.full((m, m), np.nan)
-        self.rejected = False
+        self.rejected = self.reopened = False
+        self._streak = np.zeros(2, dtype=np.int64)  # rows rejected in a row, before this epoch and now
         self.base_mean, self.root = problem.mean.copy(), self._kernel.prior_root()
         self.base_root = self.root.copy()
         self._row, self._values, self._rows_of = np.full(m, np.nan), np.empty((0, m)), np.empty(0, dtype=np.int64)
@@ -86,6 +88,7 @@ class LiveRootFilter(Session):
         if measured:
             self._clock.time, self.base_mean, self.base_root = self.time, self.mean, self.root
             self._values, self._rows_of = self._values[:0], self._rows_of[:0]
+            self._streak[0] = self._streak[1]
         self.time = t
         return True
 
@@ -108,7 +111,7 @@ class LiveRootFilter(Session):
         self._rows_of = np.concatenate([self._rows_of, [s]])
         gate, _, innovations = self._run()
         self.innovation, self.innovation_covariance = innovations.nu[-1].copy(), innovations.S[-1].copy()
-        self.rejected = bool(gate.rejected[-1])
+        self.rejected, self.reopened = bool(gate.rejected[-1] == 1), bool(gate.rejected[-1] == 2)
         if self._has_roots and self.time is not None:
             self._look_for_root(s, self.time)
 
@@ -123,7 +126,10 @@ class LiveRootFilter(Session):
         epoch.count[0], epoch.scale[0] = self._clock.step(dt) if dt > 0 else (1, 0.0)
         epoch.measured.z[:], epoch.measured.station[:] = self._values, self._rows_of
         run = epoch.run(t if self._clock.time is None else self._clock.time)
+        streak = epoch.results[0].streak
+        streak[0] = self._streak[0]
         self.root = self._kernel.run(run, epoch.measured, self.base_mean, self.base_root, epoch.results).copy()
+        self._streak[1] = streak[0]
         beliefs = epoch.results[1]
         self.mean, self.covariance = beliefs.mean[0].copy(), beliefs.covariance[0].copy()
         return epoch.results
@@ -143,7 +149,11 @@ class LiveRootFilter(Session):
 
     def _saved_state(self) -> dict[str, Array]:
         clock = [np.nan if v is None else v for v in (self._clock.time, self.time)]
-        rows = {"epoch_values": self._values.copy(), "epoch_stations": self._rows_of.copy()}
+        rows = {
+            "epoch_values": self._values.copy(),
+            "epoch_stations": self._rows_of.copy(),
+            "streak": self._streak.astype(float),
+        }
         return {name: getattr(self, name).copy() for name in self._arrays} | rows | {"clock": np.array(clock)}
 
     def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
@@ -151,11 +161,12 @@ class LiveRootFilter(Session):
         found = {name: checked.mean(name) for name in ("base_mean", "mean")}
         found |= {name: checked.array(name, n, n) for name in ("base_root", "root")}
         values, rows_of = checked.measurements("epoch_values", "epoch_stations")
-        rows = {"epoch_values": values, "epoch_stations": rows_of}
+        rows = {"epoch_values": values, "epoch_stations": rows_of, "streak": checked_streak(saved)}
         return found | rows | {"covariance": checked.covariance("covariance"), "clock": checked.clock("clock", 2)}
 
     def _set_state(self, kept: Mapping[str, Array]) -> None:
         for name in self._arrays:
             setattr(self, name, kept[name])
         self._values, self._rows_of = kept["epoch_values"], kept["epoch_stations"]
+        self._streak[:] = kept["streak"]
         self._clock.time, self.time = clock_times(kept["clock"])

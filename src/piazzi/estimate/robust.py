@@ -71,7 +71,8 @@ def chain_for(problem: Problem, inputs: Inputs, loss: Loss | None) -> Chain:
 
 def gated_run(problem: Problem, inputs: Inputs) -> Array:
     """Means (K, n) of an extended Kalman filter that leaves out what it cannot believe."""
-    return guarded_run(problem, inputs, update_fragments(problem, "auto"), Guard(1, GATE))[0]
+    mean: Array = guarded_run(problem, inputs, update_fragments(problem, "auto"), Guard(1, GATE))[0]
+    return mean
 
 
 def solve_at(chain: Chain, solver: Solver, states: Array) -> None:

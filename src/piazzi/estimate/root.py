@@ -11,7 +11,7 @@ import numpy as np
 
 from piazzi import kernels
 from piazzi.estimate.estimator import Estimate, Stopwatch
-from piazzi.estimate.guarded import Guard
+from piazzi.estimate.guarded import Guard, gate_bundle, gate_details
 from piazzi.estimate.soundness import check_start
 from piazzi.kernels import KernelSpec
 from piazzi.kernels.bundle import Beliefs, Gate, Innovations, JointRoot, Measured, RootForm, Run
@@ -92,8 +92,7 @@ class RootKernel:
     def results(self, epochs: int, rows: int) -> Results:
         """Room for what a run over so many epochs and rows gives."""
         n, m = self.problem.model.n, self.problem.model.width
-        gate = Gate(iterations=1, limits=self._limits, rejected=np.empty(rows, dtype=np.int64))
-        return gate, Beliefs.empty(K=epochs, N=n), Innovations.empty(J=rows, M=m)
+        return gate_bundle(1, self._limits, rows), Beliefs.empty(K=epochs, N=n), Innovations.empty(J=rows, M=m)
 
     def run(self, run: Run, measured: Measured, start: Array, U: Array, results: Results) -> Array:
         """Write the results of a run from the mean `start` with the root `U`; the last root, whose array is reused."""
@@ -126,7 +125,5 @@ def root_estimate(
     check_start(problem, inputs, mean[0])
     details: dict[str, Any] = dict(about)
     if root.gate is not None:
-        out = gate.rejected.astype(bool)
-        out.setflags(write=False)
-        details |= {"rejected": out, "rejected_count": int(out.sum())}
+        details |= gate_details(gate, tracking)
     return Estimate(problem, tracking, mean, P, nu, S, inputs.epochs, seconds, details=details)

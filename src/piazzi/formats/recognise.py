@@ -71,6 +71,7 @@ FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "TDM XML": Format(_root(rb"tdm"), tracking="tdm:read_xml"),
     "OEM": Format(_begins(rb"CCSDS_OEM_VERS\s*="), ephemeris="oem:read_kvn"),
     "OPM": Format(_begins(rb"CCSDS_OPM_VERS\s*="), ephemeris="opm:read_opm"),
+    "OCM": Format(_begins(rb"CCSDS_OCM_VERS\s*="), ephemeris="ocm:read"),
     "OMM": Format(_begins(rb"CCSDS_OMM_VERS\s*="), ephemeris="opm:read_omm"),
     "TLE": Format(_begins(rb"(?:[^\n]*\n)?1 [ 0-9A-Z]{5}[ A-Z] .{8} \d\d[ \d]{3}\."), ephemeris="tle:read"),
     "OEM XML": Format(_root(rb"(?:oem|opm|omm|ndm)"), ephemeris="odm_xml:read"),

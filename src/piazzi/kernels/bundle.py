@@ -57,8 +57,11 @@ class Row(Bundle, nu="M", H="M N", work="W"):
     """Work space for one row: innovation, Jacobian, and the factors of an update."""
 
 
-class Gate(Bundle, iterations="int", limits="M+1", rejected="int64 J"):
-    """How an epoch is taken in: Gauss-Newton steps, largest nu^T S^-1 nu by number of components, and who was beyond it."""
+class Gate(Bundle, iterations="int", limits="M+1", streak="int64 1", rejected="int64 J"):
+    """How an epoch is taken in: Gauss-Newton steps, largest nu^T S^-1 nu by number of components, and who was beyond it.
+
+    `rejected` is 1 for a row that was left out, 2 for one that was beyond the gate and taken because it was open.
+    """
 
 
 class Chain(

@@ -22,6 +22,7 @@ def sizes_source(model: Model, lanes: int) -> str:
         "WORK": model.width * (model.width + model.n),
         "NUMBERS": model.most_numbers,
         "FEW_DIGITS": 1e8,
+        "REOPENS": 5,  # rows in a row beyond a gate, from which on it is open
         "LOST": 1e-15 * max(model.n, 4),  # of a diagonal: what is left below it is rounding
     }
     return "".join(f"{k} = {v}\n" for k, v in sizes.items()) + "\n\n"

@@ -51,6 +51,7 @@ NUMBERS: int
 LANES: int
 LOST: float
 FEW_DIGITS: float
+REOPENS: int
 MAX_STEPS: int
 MAX_PANELS: int
 RTOL: float
@@ -154,8 +155,8 @@ predict_deviation: Any
 backward: Any
 update_deviation: Any
 squared_innovation: Any
-is_beyond: Any
 update_epoch_guarded: Any
+passes_gate: Any
 # written in fragments/graph_linearize.py
 weigh_dynamics: Any
 # written in fragments/*_lanes.py

@@ -118,7 +118,7 @@ def difference(
 
     Parameters
     ----------
-    a, b : each a file (OEM, OPM, SP3, CPF, two-line elements, OMM), an `Ephemeris`, one of its arcs, mean elements,
+    a, b : each a file (OEM, OPM, OCM, SP3, CPF, two-line elements, OMM), an `Ephemeris`, one of its arcs, mean elements,
     or a function
         that takes a list of Epochs and gives position (m) and velocity (m/s), (K, 3) each, in the GCRF
     axes : RTN or TNW of `a` at each time, or a frame of `piazzi.earth.FRAMES`

@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi.earth import Epoch, rotation_rate, transform
 from piazzi.formats.ephemeris import Arc, MeanElements
+from piazzi.formats.ocm import used_by
 from piazzi.orbit.axes import state_axes
 from piazzi.orbit.differential import Array
 from piazzi.orbit.interpolation import interpolated
@@ -21,13 +22,17 @@ _SAME = 1e-3  # s: a covariance is of a state that is as near as this
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A state (6,) in m and m/s on the axes of the GCRF, its covariance (6, 6) or None, and where it is from."""
+    """A state (6,) in m and m/s on the axes of the GCRF, its covariance (6, 6) or None, and where it is from.
+
+    `used` are the first and the last measurement that it was determined from, where the file says them.
+    """
 
     name: str
     epoch: Epoch
     state: Array
     covariance: Array | None
     source: str
+    used: tuple[Epoch, Epoch] | None = None
 
 
 def start_of(what: Any, near: Epoch | None = None, chosen: str | None = None) -> Start:
@@ -35,7 +40,7 @@ def start_of(what: Any, near: Epoch | None = None, chosen: str | None = None) ->
 
     Parameters
     ----------
-    what : a file (OEM, OPM, SP3, CPF, two-line elements, OMM), an `Ephemeris`, an `Arc` or `MeanElements`
+    what : a file (OEM, OPM, OCM, SP3, CPF, two-line elements, OMM), an `Ephemeris`, an `Arc` or `MeanElements`
     near : of several states the nearest one is taken; default the last with a covariance, or else the last
     chosen : name or identifier of the object, where there are several
 
@@ -81,7 +86,7 @@ def _of_arc(arc: Arc, name: str, near: Epoch | None) -> Start:
         made = ", its velocity from the positions around it"
     r, v = transform(position, velocity, arc.frame, "GCRF", arc.frame_epoch or epoch)
     state = np.concatenate([r, np.asarray(v)])
-    return Start(who, epoch, state, _covariance(arc, k, state), f"state {k + 1} of {len(arc)} in {name}{made}")
+    return Start(who, epoch, state, _covariance(arc, k, state), f"state {k + 1} of {len(arc)} in {name}{made}", used_by(arc))
 
 
 def _covariance(arc: Arc, k: int, state: Array) -> Array | None:

@@ -32,13 +32,21 @@ def squared_innovation(row, innovations, L):
 
 
 @inline
-def is_beyond(row, squared, limit, innovations):
-    """1 for a row beyond the gate, else 0; a row without a prediction is taken, so that the failure shows."""
-    beyond = 1 if squared > limit else 0
+def passes_gate(row, squared, present, gate, innovations):
+    """Whether a row is taken: it lies within the gate, or the gate is open, as so many rows in a row were beyond it.
+
+    Good rows are rejected one after the other only by a belief that is wrong.  An open gate closes with the first row within.
+    A row without a prediction is taken, so that the failure shows.
+    """
+    beyond = squared > gate.limits[present]
     for i in range(M):
         if fabs(innovations.nu[row * M + i]) == inf:
-            beyond = 0
-    return beyond
+            beyond = False
+    gate.streak[0] = gate.streak[0] + 1 if beyond else 0
+    gate.rejected[row] = 0
+    if beyond:
+        gate.rejected[row] = 2 if gate.streak[0] > REOPENS else 1
+    return gate.rejected[row] != 1
 
 
 @inline
@@ -49,7 +57,7 @@ def gate_rows(run, k, x, P, p, measured, gate, innovations):
         innovate_row(measured, row, run.t[k], x, p, own.nu, own.H, 0)
         record(row, P, measured, own, innovations)
         squared, present = squared_innovation(row, innovations, own.work)
-        gate.rejected[row] = is_beyond(row, squared, gate.limits[present], innovations)
+        passes_gate(row, squared, present, gate, innovations)
 
 
 @inline
@@ -68,7 +76,7 @@ def update_epoch_guarded(run, k, x, P, p, measured, gate, innovations):
         d = unit(-1, N)
         P_new = P
         for row in range(run.first_row[k], run.first_row[k + 1]):
-            if gate.rejected[row] == 0:
+            if gate.rejected[row] != 1:
                 innovate_row(measured, row, run.t[k], x + offset, p, own.nu, own.H, 0)
                 for i in range(M):
                     told = own.nu[i] + load_vector(own.H, i * N, N) @ offset

@@ -37,8 +37,7 @@ def run_root_filter(
             innovate_root(measured, row, run.t[k], x, p, root, own, joint)
             record_root(row, measured, own, joint, innovations)
             squared, present = squared_innovation(row, innovations, own.work)
-            gate.rejected[row] = is_beyond(row, squared, gate.limits[present], innovations)
-            if gate.rejected[row] == 0:
+            if passes_gate(row, squared, present, gate, innovations):
                 update_root_row(row, measured, own, joint)
         x = finish_epoch(x, root, joint)
         store(beliefs.mean, k * N, x)
