@@ -66,9 +66,10 @@ class Exponentials(HarrisPriester):
 
     def block(self, first=0.0, last=0.0):
         starts = np.arange(100e3, 1000e3, 10e3)
-        low, high = (np.stack([np.interp(h, TABLE[:, 0] * 1e3, np.log(c * 1e-12)) for c in TABLE[:, 1:].T], 1) for h in (starts, starts + 10e3))
-        zero = np.zeros_like(low)
-        return Pieces(100e3, 10e3, np.stack([zero, zero, (high - low) / 2, (high + low) / 2], axis=1), np.zeros(2), np.zeros(2)).block
+        columns = [(TABLE[:, 0] * 1e3, np.log(c * 1e-12)) for c in TABLE[:, 1:].T]
+        low, high = (np.stack([np.interp(h, *c) for c in columns], axis=1) for h in (starts, starts + 10e3))
+        terms = np.stack([0 * low, 0 * low, (high - low) / 2, (high + low) / 2], axis=1)
+        return Pieces(100e3, 10e3, terms, np.zeros(2), np.zeros(2)).block
 
 
 @cache
@@ -80,16 +81,20 @@ def after_a_day(on=(), degree=20, pressure=OWN_PRESSURE, as_there=False):
     if as_there:
         functions["air"] = Exponentials()
     problem = pz.Problem(
-        forces(20).model(parameters=["as_there"], definitions=AS_THERE, functions={"their_sun": functions["their_sun"].signature}),
+        forces(20).model((), ["as_there"], None, AS_THERE, {"their_sun": functions["their_sun"].signature}),
         pz.Gaussian(STATE, [1.0] * 6),
         parameters={
-            **switches, "cr_a_m": 0.02 * pressure / OWN_PRESSURE, "cd_a_m": 0.02, "air_exponent": 6.0, "as_there": float(as_there),
+            **switches,
+            "cr_a_m": 0.02 * pressure / OWN_PRESSURE,
+            "cd_a_m": 0.02,
+            "air_exponent": 6.0,
+            "as_there": float(as_there),
         },
         integrator=pz.RungeKutta8(2880),
         functions=functions,
         epoch=EPOCH,
         prior_time=0.0,
-    )  # fmt: skip
+    )
     return problem.step(STATE, 86400.0, 0.0)[0][:3]
 
 
