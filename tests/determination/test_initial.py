@@ -6,6 +6,8 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi import earth
+from piazzi.determination.determining import fitting_orbits
+from piazzi.determination.extending import Refined, drift
 from piazzi.determination.sights import rows_of
 from piazzi.orbit import Keplerian
 from piazzi.orbit.fits import DIRECTION, RANGE
@@ -40,6 +42,50 @@ def test_what_no_sensor_can_tell_is_said():
     )
     with pytest.raises(ValueError, match="measures distances, their rates, directions or positions"):
         pz.initial_orbits(problem, pz.Tracking([0.0, 60.0], [[7e6], [7e6]], epoch=EPOCH))
+
+
+def test_the_sigma_of_the_mean_motion_is_by_its_derivative():
+    mu, x = 3.986004418e14, STATE
+    root = np.diag([30.0, 20.0, 10.0, 0.03, 0.02, 0.01]) @ np.tril(np.random.default_rng(3).normal(size=(6, 6)))
+
+    def motion(state):
+        a = 1.0 / (2.0 / np.linalg.norm(state[:3]) - state[3:] @ state[3:] / mu)
+        return np.sqrt(mu / a**3)
+
+    h = np.array([1.0] * 3 + [1e-3] * 3)
+    slope = np.array([(motion(x + e) - motion(x - e)) / (2 * e.sum()) for e in np.diag(h)])
+    one = Refined(None, x, root @ root.T, 0.0, 6, EPOCH)
+    assert_allclose(drift(one, mu), np.linalg.norm(slope @ root), rtol=1e-6)
+
+
+@pytest.mark.parametrize("days", [0.3, 90.0])
+def test_rows_are_taken_as_far_as_turns_can_be_counted(days):
+    """Fifty kilometres over two hours are about a hundredth of the mean motion: turns in months."""
+    at = np.concatenate([np.arange(0.0, 7200.0, 900.0), 86400.0 * days + np.array([0.0, 900.0])])
+    path = truth(at if days < 1.0 else at[:-2])[:, :3]
+    path = np.concatenate([path, np.tile(STATE[:3], (len(at) - len(path), 1))])  # far away it does not matter where it is
+    rows = observations(path + 5e4 * np.random.default_rng(4).standard_normal((len(at), 3)), at, 5e4)
+    found = fitting_orbits(rows)
+    (mode,) = found.modes
+    if days < 1.0:
+        assert mode.rows == 3 * len(at) and found.beyond is None
+        return
+    assert mode.rows == 3 * (len(at) - 2)
+    assert found.beyond.rows == 2 and found.beyond.turns > 1.0
+    assert_allclose(found.beyond.gap, 86400.0 * days - at[-3], rtol=1e-9)
+    assert "2 rows do not belong to that arc: the nearest is 89.9 days away" in str(found)
+    assert found.to_dict()["beyond"]["rows"] == 2
+
+
+@pytest.mark.slow
+def test_real_files_of_passes_weeks_and_years_apart(data_dir):
+    """Laser ranges to LAGEOS-1: 14 over 47 days belong to one orbit; of 29 over 16 months two nights are a ridge."""
+    (mode,) = fitting_orbits(str(data_dir / "ilrs/lageos1-test.npt"), stations="ilrs").modes
+    assert mode.rows == 14 and mode.weighted_rms < 2.0
+    a = 1.0 / (2.0 / np.linalg.norm(mode.mean[:3]) - mode.mean[3:] @ mode.mean[3:] / 3.986004418e14)
+    assert abs(a - 12270e3) < 20e3  # of LAGEOS-1
+    found = fitting_orbits(str(data_dir / "ilrs/Rollover.frd"), stations="ilrs")
+    assert not found.modes and found.ridge.known == 4 and found.beyond.rows == 11 and found.beyond.turns > 1.0
 
 
 @pytest.mark.slow

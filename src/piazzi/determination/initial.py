@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from piazzi.determination.centres import Centre, centre_of
+from piazzi.determination.extending import LONGER, refined, weighed
 from piazzi.determination.initial_result import InitialOrbits, OrbitMode, Parting
 from piazzi.determination.ridge import OPEN, openness, ridge
 from piazzi.determination.sights import observers, rows_of
-from piazzi.earth import Epoch
-from piazzi.estimate.batch import BatchLeastSquares, undisturbed
-from piazzi.estimate.estimator import Estimate
-from piazzi.evaluate.information import along
 from piazzi.orbit import propagate_kepler
 from piazzi.orbit.fits import Rows
-from piazzi.orbit.modes import SAME, Mode, Search, two_body_modes
+from piazzi.orbit.modes import Mode, Search, two_body_modes
 from piazzi.orbit.starts import Region
-from piazzi.problem import Gaussian, Problem, Tracking
+from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
-from piazzi.problem.inputs import prepare
 
-LONGER = 4.0  # how much longer each next stretch is
 ENOUGH = 5  # rows of a stretch
 MOST = 6  # two-body orbits that are refined
-WIDE = 0.3  # of distance and speed: the sigma of where a fit begins
+WIDEST = 16.0  # stretches, within which two-body motion still says what to begin with
 
 
 def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None = None) -> InitialOrbits:
@@ -53,126 +47,61 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None =
         raise ValueError("initial orbits need a problem with states x, y, z, vx, vy, vz and an epoch")
     centre = _centre(problem)
     region = centre.region if region is None else region
-    rows, index = rows_of(problem, tracking)
-    first = first_stretch(rows, centre.stretch)
-    search = two_body_modes(rows.of(first), region)
+    rows, index = rows_of(problem, _around(tracking, centre.stretch))
+    first, search = _looked(rows, centre.stretch, region)
     if not search.modes and len(np.unique(rows.t)) > 2:
         raise ValueError(f"no orbit fits the {len(np.unique(index[first]))} rows of the first stretch ({search.starts} starts)")
     inside = [m for m in search.modes if m.admissible] or list(search.modes)
     wide, known = openness(inside[0]) if inside else (np.inf, 0)
-    if wide > OPEN and len(first) == len(rows):
-        found = ridge(rows, region, problem.epoch, known)
-        return InitialOrbits((), search.starts, search.fits, None, centre.name, found)
-    begin = float(rows.t[first].min())
-    refined = [*_refined(problem, tracking, search, inside[:MOST], begin, float(rows.t[first].max()), region)]
-    modes = _weighed(refined) or tuple(_unrefined(problem, search, inside[:MOST], len(np.unique(index[first]))))
+    ends = float(rows.t[first].min()), float(rows.t[first].max())
+    found, keep, beyond = refined(problem, tracking, inside[:MOST], search.epoch, ends, centre)
+    if wide > OPEN and ((tracking.row_times[keep] <= ends[1]) & (tracking.row_times[keep] >= ends[0])).all():
+        what = ridge(rows.of(first), region, problem.epoch, known)
+        return InitialOrbits((), search.starts, search.fits, None, centre.name, what, beyond)
+    modes = weighed(found) or tuple(_unrefined(problem, search, inside[:MOST], len(np.unique(index[first]))))
     apart = _apart(problem, tracking, modes, centre) if len(modes) > 1 else None
-    return InitialOrbits(modes, search.starts, search.fits, apart, centre.name)
+    return InitialOrbits(modes, search.starts, search.fits, apart, centre.name, None, beyond)
+
+
+def _around(tracking: Tracking, length: float) -> Tracking:
+    """The rows of the first stretch, and those that are near it."""
+    times = tracking.row_times
+    own = times[first_stretch(times, length, WIDEST * length)]
+    keep = (times >= own.min() - WIDEST * length) & (times <= own.max() + WIDEST * length)
+    return Tracking(times[keep], tracking.values[keep], tracking.row_stations[keep], epoch=tracking.epoch)
+
+
+def _looked(rows: Rows, length: float, region: Region) -> tuple[Array, Search]:
+    """The stretch whose rows are looked at first, and what fits them: longer while they leave a ridge and others are near."""
+    longest = WIDEST * length
+    first = first_stretch(rows.t, length, longest)
+    search = two_body_modes(rows.of(first), region)
+    while len(first) < len(rows) and length < longest:
+        inside = [m for m in search.modes if m.admissible] or list(search.modes)
+        if inside and openness(inside[0])[0] <= OPEN:
+            break
+        length *= LONGER
+        more = first_stretch(rows.t, length, longest)
+        if len(more) > len(first):
+            first, search = more, two_body_modes(rows.of(more), region)
+    return first, search
 
 
 def _centre(problem: Problem) -> Centre:
     return centre_of(next((p.about for s in problem.stations if (p := s.place) is not None and hasattr(p, "about")), "earth"))
 
 
-def first_stretch(rows: Rows, length: float) -> Array:
-    """Indices of the stretch of so many seconds that holds most rows, the earliest of equals; longer where it holds too few."""
-    order = np.argsort(rows.t, kind="stable")
-    t = rows.t[order]
+def first_stretch(times: Array, length: float, longest: float = np.inf) -> Array:
+    """Indices of the stretch of so many seconds that holds most times, the earliest of equals; longer where it holds too few."""
+    order = np.argsort(times, kind="stable")
+    t = times[order]
     while True:
         last = np.searchsorted(t, t + length, side="right")
         held = last - np.arange(len(t))
         k = int(np.argmax(held))
-        if held[k] >= min(ENOUGH, len(t)) or length > t[-1] - t[0]:
+        if held[k] >= min(ENOUGH, len(t)) or length > min(t[-1] - t[0], longest / 1.5):
             return order[k : last[k]]
         length *= LONGER
-
-
-@dataclass(frozen=True, eq=False)
-class _Refined:
-    state: Array
-    covariance: Array
-    square: float
-    count: int
-    epoch: Epoch
-
-
-def _refined(
-    problem: Problem, tracking: Tracking, search: Search, modes: list[Mode], begin: float, end: float, region: Region
-) -> Iterator[_Refined]:
-    """Fits of the problem itself, over the stretch from `begin` to `end` and then over longer ones."""
-    times = tracking.row_times
-    for mode in modes:
-        r, v = propagate_kepler(mode.state[:3], mode.state[3:], region.mu, begin - search.epoch)
-        state, low, high, best = np.concatenate([r, v]), begin, end, None
-        while True:
-            keep = (times >= low) & (times <= high)
-            found = _fit(problem, tracking, keep, state)
-            if found is None:
-                break
-            estimate, best = found
-            state = estimate.mean[0, :6]
-            if keep.all():
-                break
-            span = (LONGER - 1) * max(high - low, 60.0)
-            at, low, high = float(estimate.times[0]), low - span, high + span
-            first = float(times[times >= low].min())
-            if first < at:
-                r, v = propagate_kepler(state[:3], state[3:], region.mu, first - at)
-                state = np.concatenate([r, v])
-        if best is not None:
-            yield best
-
-
-def _fit(problem: Problem, tracking: Tracking, keep: Array, state: Array) -> tuple[Estimate, _Refined] | None:
-    times = tracking.row_times[keep]
-    sigma = np.concatenate([np.full(3, WIDE * np.linalg.norm(state[:3])), np.full(3, WIDE * np.linalg.norm(state[3:]))])
-    few = Tracking(times, tracking.values[keep], tracking.row_stations[keep], epoch=tracking.epoch)
-    start = np.concatenate([state, problem.mean[6:]])
-    prior = Gaussian(state, np.diag(sigma**2))
-    posed = replace(problem, prior=prior, prior_time=float(times.min()))
-    try:
-        estimate = BatchLeastSquares(start=start, max_iterations=30, tolerance=1e-3).estimate(posed, few)
-    except ValueError:
-        return None
-    if not estimate.success:
-        return None
-    square, count = _square(posed, few, estimate)
-    epoch = problem.epoch + float(estimate.times[0])
-    return estimate, _Refined(estimate.mean[0, :6], estimate.covariance[0, :6, :6], square, count, epoch)
-
-
-def _square(problem: Problem, tracking: Tracking, estimate: Estimate) -> tuple[float, int]:
-    """Sum of squares of whitened residuals, and how many there are."""
-    exact = problem if problem.is_noise_free else undisturbed(problem)
-    left = along(exact, prepare(exact, tracking), estimate.mean).innovations
-    there = np.isfinite(left)
-    return float(np.sum(left[there] ** 2)), int(there.sum())
-
-
-def _weighed(found: list[_Refined]) -> tuple[OrbitMode, ...]:
-    """The different ones, with probabilities; only those that were fitted to the most rows count."""
-    most = max((f.count for f in found), default=0)
-    ordered = sorted((f for f in found if f.count == most), key=lambda f: f.square)
-    kept: list[_Refined] = []
-    for one in ordered:
-        if all(_apart_in_sigmas(one, other) > SAME for other in kept):
-            kept.append(one)
-    if not kept:
-        return ()
-    scale = max(kept[0].square / max(most - 6, 1), 1.0)  # forces that are left out make all of them worse
-    score = np.array([-0.5 * f.square / scale + 0.5 * np.linalg.slogdet(f.covariance)[1] for f in kept])
-    weight = np.exp(score - score.max())
-    share = weight / weight.sum()
-    return tuple(
-        OrbitMode(f.epoch, f.state, f.covariance, float(p), float(np.sqrt(f.square / max(f.count, 1))), f.count)
-        for p, f in sorted(zip(share.tolist(), kept, strict=True), key=lambda pair: -pair[0])
-        if p > 1e-6
-    )
-
-
-def _apart_in_sigmas(one: _Refined, other: _Refined) -> float:
-    root = np.linalg.cholesky(other.covariance + 1e-12 * np.diag(np.diag(other.covariance)))
-    return float(np.sum(np.linalg.solve(root, one.state - other.state) ** 2))
 
 
 def _unrefined(problem: Problem, search: Search, modes: list[Mode], rows: int) -> Iterator[OrbitMode]:

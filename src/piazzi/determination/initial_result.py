@@ -71,6 +71,32 @@ class Parting:
         return f"{self.distance / 1e3:,.1f} km, {degrees:.3g} deg on the sky of {self.station}, on {self.epoch}"
 
 
+@dataclass(frozen=True)
+class Beyond:
+    """Rows that an orbit does not reach.
+
+    Attributes
+    ----------
+    rows : how many
+    epoch, gap : of the nearest, and how far it is from those that the orbit is fitted to, s
+    turns : sigma of the number of revolutions until there; 0 where it is known and no orbit fits these rows too
+    """
+
+    rows: int
+    epoch: Epoch
+    gap: float
+    turns: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {"rows": self.rows, "epoch": str(self.epoch), "gap": self.gap, "turns": self.turns}
+
+    def __str__(self) -> str:
+        days = self.gap / 86400.0
+        why = f"revolutions until there are known to +- {self.turns:.2g} only" if self.turns else "no orbit fits them too"
+        return f"{self.rows} rows do not belong to that arc: the nearest is {days:,.3g} days away, on {self.epoch}, and {why}"
+
+
 @dataclass(frozen=True, eq=False)
 class InitialOrbits:
     """Orbits that fit, the most probable first.
@@ -82,6 +108,7 @@ class InitialOrbits:
     apart : where the first two part next; None where there is one
     about : what they go about, "earth" or "sun"
     ridge : what is known where the measurements are too few for an orbit; there are no modes then
+    beyond : rows that the orbits were not fitted to; None where they were fitted to all
     """
 
     modes: tuple[OrbitMode, ...]
@@ -90,6 +117,7 @@ class InitialOrbits:
     apart: Parting | None = None
     about: str = "earth"
     ridge: Ridge | None = None
+    beyond: Beyond | None = None
 
     __repr__ = brief
 
@@ -102,11 +130,13 @@ class InitialOrbits:
             "names": list(STATES), "modes": [mode.to_dict(scale) for mode in self.modes],
             "apart": None if self.apart is None else self.apart.to_dict(),
             "ridge": None if self.ridge is None else self.ridge.to_dict(),
+            "beyond": None if self.beyond is None else self.beyond.to_dict(),
         }  # fmt: skip
 
     def __str__(self) -> str:
+        rest = [] if self.beyond is None else [str(self.beyond)]
         if self.ridge is not None:
-            return str(self.ridge)
+            return "\n".join([str(self.ridge), *rest])
         many = "1 orbit fits" if len(self.modes) == 1 else f"{len(self.modes)} orbits fit"
         lines = [f"{many} about the {self.about.title()} ({self.fits} fits from {self.starts} starts)"]
         for mode in self.modes:
@@ -115,7 +145,7 @@ class InitialOrbits:
             lines.append(f"  probability {mode.probability:.3f}: {where}, weighted RMS {mode.weighted_rms:.2f} of {mode.rows}")
         if self.apart is not None:
             lines.append(f"The first two part by {self.apart}")
-        return "\n".join(lines)
+        return "\n".join([*lines, *rest])
 
 
 class UndeterminedError(ValueError):

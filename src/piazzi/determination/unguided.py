@@ -37,7 +37,7 @@ def first_look(seen: Measured) -> Guess:
     if seen.about == "sun":  # whose forces do not depend on the orbit
         return _nominal(seen)
     rows = _plain(seen)
-    kept = first_stretch(rows, EARTH.stretch)
+    kept = first_stretch(rows.t, EARTH.stretch)
     coarse = replace(rows, sigma=np.where(rows.kind[:, None] == DIRECTION, np.hypot(rows.sigma, AIR), rows.sigma))
     search = two_body_modes(coarse.of(kept), EARTH.region, motion=MOTION)
     if not search.modes and len(np.unique(rows.t)) < 3:  # anything will do: what they determine is found out later
@@ -81,7 +81,7 @@ def goes_about_the_sun(seen: Measured) -> bool:
 
 def _fits(rows: Rows, centre: Centre) -> bool:
     """Whether a two-body orbit about a centre leaves residuals that are not many sigma."""
-    few = rows.of(first_stretch(rows, SUN.stretch))
+    few = rows.of(first_stretch(rows.t, SUN.stretch))
     search = two_body_modes(few, centre.region)
     return any(m.admissible and m.square <= 2 * len(few) * FITS**2 for m in search.modes)
 
@@ -107,6 +107,9 @@ def unguided(seen: Measured, pose: Callable[[Guess], Problem]) -> Guess:
     found: InitialOrbits = initial_orbits(pose(first_look(seen)), seen.tracking)
     if found.ridge is not None:
         raise UndeterminedError(found)
+    if found.beyond is not None:
+        best = found.modes[0]
+        raise ValueError(f"an orbit fits {best.rows} measurements from {best.epoch} on, but {found.beyond}: give them apart, or --guess")
     best = found.modes[0]
     words = "the only orbit that fits" if len(found.modes) == 1 else f"the most probable of {len(found.modes)} orbits that fit"
     told = f"{words}, of {found.starts} starts"

@@ -102,6 +102,8 @@ class BatchLeastSquares:
     max_iterations : int
     tolerance : float
         Converged when no state moves by more than this many of its standard deviations.
+    graph : bool
+        Ask the full graph where the iterations do not converge.
 
     Notes
     -----
@@ -116,6 +118,7 @@ class BatchLeastSquares:
     start: Any = None
     max_iterations: int = 50
     tolerance: float = 1e-6
+    graph: bool = True
 
     def __post_init__(self) -> None:
         if self.max_iterations < 1:
@@ -165,7 +168,7 @@ class BatchLeastSquares:
         used = "prior" if self.start is None else "given"
         limit = self.max_iterations if self.start is not None else min(self.max_iterations, MAX_FROM_PRIOR)
         outcome = optimize(chain, solver, np.broadcast_to(first, chain.x.shape), limit, self.tolerance)
-        if not (outcome.failure or "remark" in outcome.details):
+        if not (outcome.failure or "remark" in outcome.details) or not self.graph:
             return outcome, used
         graph = nominal(FactorGraph(), noise_free, tracking)
         begin = np.asarray(graph.details["first_state"]) if graph.success else chain.x[0].copy()
