@@ -151,7 +151,7 @@ def _square(problem: Problem, tracking: Tracking, estimate: Estimate) -> tuple[f
 
 
 def _different(found: Iterator[Refined]) -> list[Refined]:
-    """Those that are not the same as a better one, the best first; those with no share in what they say of the rows left out."""
+    """Those that are not the same as a better one, the best first; improbable ones left out."""
     kept: list[Refined] = []
     for one in sorted(found, key=lambda f: f.square):
         if all(_apart_in_sigmas(one, other) > SAME for other in kept):

@@ -92,7 +92,7 @@ def _centre(problem: Problem) -> Centre:
 
 
 def first_stretch(times: Array, length: float, longest: float = np.inf) -> Array:
-    """Indices of the stretch of so many seconds that holds most times, the earliest of equals; longer where it holds too few."""
+    """Indices of the stretch of so many seconds that holds most times, the earliest of equals; longer where too few."""
     order = np.argsort(times, kind="stable")
     t = times[order]
     while True:

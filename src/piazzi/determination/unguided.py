@@ -108,8 +108,8 @@ def unguided(seen: Measured, pose: Callable[[Guess], Problem]) -> Guess:
     if found.ridge is not None:
         raise UndeterminedError(found)
     if found.beyond is not None:
-        best = found.modes[0]
-        raise ValueError(f"an orbit fits {best.rows} measurements from {best.epoch} on, but {found.beyond}: give them apart, or --guess")
+        fits = f"an orbit fits {found.modes[0].rows} measurements from {found.modes[0].epoch} on"
+        raise ValueError(f"{fits}, but {found.beyond}: give them apart, or say where to begin with --guess")
     best = found.modes[0]
     words = "the only orbit that fits" if len(found.modes) == 1 else f"the most probable of {len(found.modes)} orbits that fit"
     told = f"{words}, of {found.starts} starts"
