@@ -98,7 +98,7 @@ def test_the_usual_one_runs(simulate):
         ({"csv": "0,1\n1,nan\n"}, "push.csv, line 2: values must be finite"),
         ({"csv": "0,1\n1\n"}, "push.csv, line 2: 1 values, where the rows before have 2"),
         ({"csv": "1,1\n0,2\n"}, "times of a table must ascend; row 1 is 0 after 1"),
-        ({"text": SCENARIO.replace("field =", "sqrt =")}, "function 'sqrt' cannot be used as a name"),
+        ({"text": SCENARIO.replace("field =", "sqrt =")}, "'sqrt' cannot be used as a name: it is one of the language"),
         ({"text": SCENARIO.replace("field =", "at ="), "call": "at(x, y, z)"}, "function 'at' has a meaning already"),
         ({"text": SCENARIO.replace("field =", "x ="), "call": "x(x, y, z)"}, "function 'x' is also a state"),
         ({"text": SCENARIO.replace('a = "push', 'push = "push').replace("+ a", "+ push")}, "'push' is also a definition"),

@@ -13,8 +13,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 import piazzi as pz
 from piazzi.kernels import load_plain
 from piazzi.kernels.generate import model_source
-from piazzi.kernels.spec import machine_lanes
+from piazzi.simulation import propagate
 from piazzi.study import Study
+from piazzi.study.ensemble import Layout, filter_runs, library, simulate_runs
+from tests.laws.lanes import compared
 
 BURN, IDLE, EDGE, SLANT = 3.0, 0.5, 2.0, 0.25
 
@@ -354,17 +356,57 @@ def test_batch_finds_the_first_state():
     assert_allclose(found.mean[0], first, rtol=0, atol=2e-4)
 
 
+def scaled():
+    """Process noise that does not depend on the states, so that these, and whole runs, move in lanes."""
+    noise = pz.ProcessNoise([0.0, 1e-3], "second", "scaled")
+    return cart(pz.RungeKutta8(2), prior=pz.Gaussian([0.1, 0.6], [1e-3, 1e-3]), process_noise=noise)
+
+
+def drawn(problem, runs):
+    """First states of runs, and unit normal draws."""
+    rng = np.random.default_rng(8)
+    first = problem.mean + rng.standard_normal((runs, 2)) * np.sqrt(np.diag(problem.covariance))
+    return first, rng.standard_normal((runs, len(TIMES), 2)), rng.standard_normal((runs, len(TIMES), 1))
+
+
+@pytest.mark.parametrize("jit", ["0", pytest.param("1", marks=pytest.mark.slow)])
+def test_runs_in_an_ensemble_are_what_they_are_alone(jit, monkeypatch):
+    monkeypatch.setenv("PIAZZI_JIT", jit)
+    problem = scaled()
+    assert problem.runs_in_ensemble
+    layout, draws = Layout(problem, TIMES), drawn(problem, 11)
+    truth, z = simulate_runs(layout, problem, *draws)
+    mean, covariance, _ = filter_runs(layout, z, truth)
+    crossed = truth[:, :, 0] - EDGE + SLANT * TIMES
+    assert ((crossed[:, :-1] < 0) & (crossed[:, 1:] > 0)).sum() == 11  # each at its own time
+    for r, (first, w, v) in enumerate(zip(*draws, strict=True)):
+        states, values = propagate(problem, problem, TIMES, np.array([0]), first, w, v)
+        assert_allclose(truth[r], states, rtol=0, atol=1e-12)
+        assert_allclose(z[r], values, rtol=0, atol=1e-12)
+        found = pz.ExtendedKalmanFilter().estimate(problem, pz.Tracking(TIMES, z[r]))
+        assert_allclose(mean[r], found.mean[-1], rtol=0, atol=1e-11)
+        assert_allclose(covariance[r], found.covariance[-1], rtol=0, atol=1e-12)
+
+
+def test_only_a_group_with_a_crossing_goes_one_by_one(monkeypatch):
+    """Uncompiled a group is one run, so that its crossings can be counted."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+    problem = scaled()
+    layout = Layout(problem, TIMES)
+    inside = library(problem).simulate_lanes._function.__globals__
+    real, alone = inside["one_by_one"], []
+    monkeypatch.setitem(inside, "one_by_one", lambda t, dt, *given: alone.append(t + dt) or real(t, dt, *given))
+    truth, _ = simulate_runs(layout, problem, *drawn(problem, 3))
+    after = truth[:, :, 0] - EDGE + SLANT * TIMES > 0
+    assert_allclose(sorted(alone), sorted(TIMES[after.argmax(axis=1)]), rtol=0, atol=1e-12)
+
+
 @pytest.mark.slow
-def test_lanes_change_no_bit(seen, monkeypatch):
-    problem, tracking = seen
-    found = {}
-    for lanes in ("1", "4"):
-        monkeypatch.setenv("PIAZZI_LANES", lanes)
-        machine_lanes.cache_clear()
-        found[lanes] = [e.estimate(problem, tracking) for e in (pz.UnscentedKalmanFilter(), pz.FactorGraph())]
-    machine_lanes.cache_clear()
-    for one, four in zip(found["1"], found["4"], strict=True):
-        assert_allclose(one.mean, four.mean, rtol=0, atol=1e-12)
+def test_lanes_change_no_bit(seen):
+    for problem, tracking in (seen, (scaled(), seen[1])):
+        for estimator in (pz.UnscentedKalmanFilter(), pz.FactorGraph(), pz.SlidingWindow(6), pz.BatchLeastSquares()):
+            found = compared(estimator.estimate, problem, tracking).found
+            assert max(found.values()) <= 1e-14, found
 
 
 def test_a_study_runs(seen, tmp_path):

@@ -251,7 +251,7 @@ def test_sympy_calls_are_as_good_as_text():
         ({"definitions": {"gx": "2*field(x, y)", "gy": "x"}}, "gives 2 values: name them in a definition"),
         ({"definitions": {"gx, gy": "x*y"}}, "several values, which only a function from outside gives"),
         ({"definitions": {"gx, gy": "at(1)"}}, "'at' is not a function"),
-        ({"functions": {"sin": Well.signature}}, "function 'sin' cannot be used as a name"),
+        ({"functions": {"sin": Well.signature}}, "function 'sin' cannot be used as a name: it is one of the language"),
         ({"functions": {"field": Well.signature, "at": Well.signature}}, "function 'at' has a meaning already"),
         ({"functions": {"field": 3}}, "function 'field' is 3; it must be a function"),
         ({"functions": {"field": Well.signature, "x": Well.signature}}, "function 'x' is also a state"),

@@ -46,8 +46,9 @@ class Root:
         """The module of a problem's filter."""
         points = self.fragment == "root_unscented"
         together = points and problem.moves_in_lanes
-        # what is compiled apart is called with lanes; a whole program has the motion of one state in lanes, rounded alike
-        moved = "step_lanes" if together and problem.model.reads_data else "step_alone"
+        # what is compiled apart is called with lanes; a whole program has the motion of one state in lanes, rounded alike,
+        # if that needs not be done one by one now and then
+        moved = "step_lanes" if together and (problem.model.reads_data or problem.model.events) else "step_alone"
         parts = (
             "transition",
             *((moved,) if points else ()),

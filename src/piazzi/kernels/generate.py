@@ -9,7 +9,8 @@ the factors of an update.  The functions:
 * ``remember(x)``, ``first_rows()``: the state at the start of a step, and its derivative; ``identity_rows()``
 * ``complete(R)``: R with the constants' rows below it
 * ``dynamics_beside(t, x, p)``, ``rhs_beside(t, x, R, p)``: of a model with events, on the sides of them that `p` says
-* ``events_into(t, x, p, at)``, ``event_row(t, x, p, event)``, ``jumped(R, jump, row)``: see `_events_source`
+* ``events_of(t, x, p)``, ``events_into(t, x, p, at)``, ``event_row(t, x, p, event)``, ``jumped(R, jump, row)``: see
+  `_events_source`
 * ``measure_into(sensor, t, x, p, s, at, out, row)``: h
 * ``innovate(sensor, t, x, p, s, at, z, row, nu, H, out)``: z - h, angles wrapped and put on the sky, and H
 * ``measure_row(measured, row, t, x, p, out, at)``, ``innovate_row(measured, row, t, x, p, nu, H, out)``: of a row's station
@@ -51,7 +52,7 @@ def model_source(model: Model, scheme: tuple[Any, ...], lanes: int) -> str:
         parts.append(_dynamics_source(model))
     parts.append(_step_source(model, scheme))
     if model.events:
-        parts.append(_events_source(model))
+        parts.append(_events_source(model, lanes))
     if model.looks_elsewhen:
         parts.append(re.sub(r"\bsubstep", "elsewhen", runge_kutta_source(*DORMAND_PRINCE_8, rule=False, long=model.reads_data)))
     parts.append(_sensor_source(model))
@@ -190,25 +191,31 @@ def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
     return source
 
 
-def _events_source(model: Model) -> str:
-    """Values of events with their rates along the orbit, their derivatives by the state, and what a jump makes of rows."""
-    d, (arguments, names, call) = derive_events(model), _arguments(model)
+def _events_source(model: Model, lanes: int) -> str:
+    """Values of events with their rates along the orbit, their derivatives by the state, and what a jump makes of rows.
+
+    Where an event depends on states alone whose rates are states, as a shadow's edge does, no rate is evaluated for it.
+    """
+    d, f, (arguments, names, call) = derive_events(model), derive(model), _arguments(model)
     nd, n, count = len(model.moving), model.n, len(model.events)
     called = [f"event {name}" for name, _ in model.events]
-    J = _Jacobian(d.G, "G", called)
+    J, moving = _Jacobian(d.G, "G", called), list(f.x)
+    rate = [f"x[{moving.index(f.f[i])}]" if f.f[i] in moving else f"f[{i}]" for i in range(nd)]
     values = [f"g{e}" for e in range(count)]
     unpack = _unpack(values + J.names, f"scalar_g({call})")
-    into = [unpack, "f = dynamics_beside(t, x, p)", *(f"p.work[at + {e}] = g{e}" for e in range(count))]
-    row = [unpack, "row = unit(-1, N)"]
+    rates, row = [], [unpack, "row = unit(-1, N)"]
     for e in range(count):
-        terms = [J.entry(e, n), *(f"{J.entry(e, i)}*f[{i}]" for i in range(nd) if J.entry(e, i))]
-        into.append(f"p.work[at + {count + e}] = {' + '.join(term for term in terms if term) or '0.0'}")
+        terms = [J.entry(e, n), *(f"{J.entry(e, i)}*{rate[i]}" for i in range(nd) if J.entry(e, i))]
+        rates.append(" + ".join(term for term in terms if term) or "0.0")
         entries = ", ".join(J.entry(e, i) or "0.0" for i in range(n))
         row += [f"if event == {e}:", f"    row = vector({entries})"]
+    both = [unpack, *(["f = dynamics_beside(t, x, p)"] if any("f[" in text for text in rates) else [])]
+    into = [f"p.work[at + {i}] = {text}" for i, text in enumerate(values + rates)]
     return (
-        f"EVENTS = {count}\nEVENTS_WORK = {6 * count}\n\n\n"
+        f"EVENTS = {count}\nEVENTS_WORK = {6 * count}\nEVENTS_LANES = {2 * count * lanes}\n\n\n"
         + function("scalar_g", arguments, names, list(d.g) + J.outputs, d.partials, called + J.called)
-        + _inline("events_into(t, x, p, at)", *into, "return f", mark="outlined")
+        + _inline("events_of(t, x, p)", *both, f"return vector({', '.join(values + rates)})", mark="outlined")
+        + _inline("events_into(t, x, p, at)", *both, *into, mark="outlined")
         + _inline("event_row(t, x, p, event)", *row, "return row", mark="outlined")
         + _inline("jumped(R, jump, row)", f"return matrix({', '.join(f'R[{i}] + jump[{i}]*row' for i in range(nd))})")
     )

@@ -68,6 +68,7 @@ TOP: int
 HISTORY: int
 EVENTS: int
 EVENTS_WORK: int
+EVENTS_LANES: int
 
 
 # functions of the language, as far as fragments use them
@@ -99,6 +100,7 @@ doubled_of: Any
 joined: Any
 joined_of: Any
 dynamics_beside: Any
+events_of: Any
 events_into: Any
 event_row: Any
 jumped: Any
@@ -116,8 +118,12 @@ innovate_lanes: Any
 propagate_arc: Any
 propagate_arc_jacobian: Any
 propagate_arc_noise: Any
+arc_lanes: Any
+arc_lanes_jacobian: Any
 propagate_noise: Any
 begin: Any
+side_of: Any
+lowest: Any
 crossing: Any
 cross: Any
 arrive: Any

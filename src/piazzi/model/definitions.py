@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from piazzi.expressions import from_sympy, is_name, names
+from piazzi.expressions import CONSTANTS, FUNCTIONS, from_sympy, is_name, names
 from piazzi.expressions.outside import split, whole_call
 from piazzi.model.functions import ROOT
 
@@ -112,9 +112,9 @@ def name_of(symbol: Any, what: str) -> str:
     """Name of a SymPy symbol, or the text itself; raises ValueError unless it can name a variable in an equation."""
     name = str(symbol)
     if not is_name(name):
-        raise ValueError(
-            f"{what} {name!r} cannot be used as a name: write a letter followed by letters, digits and single underscores"
-        )
+        taken = "it is one of the language" if name in (*FUNCTIONS, *CONSTANTS) else ""
+        why = taken or "write a letter followed by letters, digits and single underscores"
+        raise ValueError(f"{what} {name!r} cannot be used as a name: {why}")
     return name
 
 

@@ -330,7 +330,7 @@ class Problem:
     def moves_in_lanes(self) -> bool:
         """Whether several of its states can be carried over an interval together: the same operations for each of them."""
         assert self.integrator is not None
-        return self.integrator.in_lanes and not self.manoeuvres and not self.model.events
+        return self.integrator.in_lanes and not self.manoeuvres
 
     @property
     def runs_in_ensemble(self) -> bool:

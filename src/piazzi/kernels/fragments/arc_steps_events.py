@@ -63,3 +63,116 @@ def propagate_arc_jacobian(t, dt, count, x, R, p):
     for i in range(count):
         x, R = cut_step_jacobian(t + i * h, h, x, R, own)
     return x, R
+
+
+@outlined
+def is_clear(start, end, sides, clock):
+    """1 where in no lane an event can lie between both ends of a step, by the first look of `passes`; else 0."""
+    clear = 1
+    for lane in range(LANES):
+        t, h = clock[lane], clock[LANES + lane]
+        slack = 1e-12 * maximum(fabs(t + h), 1.0) / fabs(h)
+        for e in range(EVENTS):
+            i, rate = e * LANES + lane, (EVENTS + e) * LANES + lane
+            a, b = sides[i] * start[i], sides[i] * h * start[rate]
+            c, d = sides[i] * end[i], sides[i] * h * end[rate]
+            if not c > slack * fabs(d):
+                clear = 0
+            elif b < 0.0 < d:
+                _, least = lowest(a, b, c, d)
+                if not least > minimum(a, c) - least:
+                    clear = 0
+    return clear
+
+
+@inline
+def is_clear_at(t, h, y, own, sides, end, clock):
+    """The same of a step from what is at the start, `own.work`, to the states `y`, which the next one starts from."""
+    store_packs(end, 0, events_of(t + h, y, own), LANES)
+    store_packs(clock, 0, vector(t + 0.0 * y[0], h + 0.0 * y[0]), LANES)
+    clear = is_clear(own.work, end, sides, clock)
+    for i in range(EVENTS_LANES):
+        own.work[i] = end[i]
+    return clear
+
+
+@inline
+def begin_lanes(t, dt, x, p, sides, start):
+    """The sides on which `LANES` orbits begin; 0, on none, for one that begins on an event (see `begin`)."""
+    for i in range(EVENTS_LANES):
+        sides[i] = 0.0
+    own = Beside(p.parameters, p.manoeuvres, p.data, load_packs(sides, 0, EVENTS, LANES), start)
+    store_packs(start, 0, events_of(t, x, own), LANES)
+    for i in range(EVENTS * LANES):
+        sides[i] = side_of(start[i])
+    own = Beside(p.parameters, p.manoeuvres, p.data, load_packs(sides, 0, EVENTS, LANES), start)
+    store_packs(start, 0, events_of(t, x, own), LANES)
+    times = scratch(LANES)
+    store_packs(times, 0, vector(t + 0.0 * x[0]), LANES)
+    for e in range(EVENTS):
+        for lane in range(LANES):
+            i = e * LANES + lane
+            if fabs(start[i]) <= 1e-12 * maximum(fabs(times[lane]), 1.0) * fabs(start[EVENTS * LANES + i]):
+                sides[i] = 0.0
+    return own
+
+
+@outlined
+def one_by_one(t, dt, count, x, p):
+    """The state of each lane by itself."""
+    times, lengths, states = scratch(LANES), scratch(LANES), scratch(N_LANES)
+    store_packs(times, 0, vector(t + 0.0 * x[0]), LANES)
+    store_packs(lengths, 0, vector(dt + 0.0 * x[0]), LANES)
+    store_lanes(states, 0, N, x)
+    for lane in range(LANES):
+        at = lane * N
+        store(states, at, propagate_arc(times[lane], lengths[lane], count, load_vector(states, at, N), p))
+    return load_lanes(states, 0, N, N, LANES)
+
+
+@outlined
+def one_by_one_jacobian(t, dt, count, x, R, p):
+    """The state of each lane by itself, and its derivative times the rows `R`."""
+    times, lengths, states, rows = scratch(LANES), scratch(LANES), scratch(N_LANES), scratch(NN_LANES)
+    store_packs(times, 0, vector(t + 0.0 * x[0]), LANES)
+    store_packs(lengths, 0, vector(dt + 0.0 * x[0]), LANES)
+    store_lanes(states, 0, N, x)
+    for lane in range(LANES):
+        at = lane * N
+        y, S = propagate_arc_jacobian(times[lane], lengths[lane], count, load_vector(states, at, N), R, p)
+        store(states, at, y)
+        store(rows, at * N, S)
+    return load_lanes(states, 0, N, N, LANES), load_matrices(rows, 0, ND, N, NN, LANES)
+
+
+@inline
+def arc_lanes(t, dt, count, x, p):
+    """`propagate_arc` of `LANES` states: together where none of them can pass an event, else one by one."""
+    h = dt / count
+    sides, start, end, clock = scratch(EVENTS_LANES), scratch(EVENTS_LANES), scratch(EVENTS_LANES), scratch(EVENTS_LANES)
+    own = begin_lanes(t, dt, x, p, sides, start)
+    y = substep(t, h, x, own)
+    clear = is_clear_at(t, h, y, own, sides, end, clock)
+    for i in range(1, count):
+        if clear == 1:
+            y = substep(t + i * h, h, y, own)
+            clear = is_clear_at(t + i * h, h, y, own, sides, end, clock)
+    return y if clear == 1 else one_by_one(t, dt, count, x, p)
+
+
+@inline
+def arc_lanes_jacobian(t, dt, count, x, R, p):
+    """`propagate_arc_jacobian` of `LANES` states, likewise."""
+    h, one = dt / count, 1.0 + 0.0 * x[0]
+    sides, start, end, clock = scratch(EVENTS_LANES), scratch(EVENTS_LANES), scratch(EVENTS_LANES), scratch(EVENTS_LANES)
+    own = begin_lanes(t, dt, x, p, sides, start)
+    y, S = substep_jacobian(t, h, x, R, own)
+    clear = is_clear_at(t, h, y, own, sides, end, clock)
+    for i in range(1, count):
+        if clear == 1:
+            y, S = substep_jacobian(t + i * h, h, y, S, own)
+            clear = is_clear_at(t + i * h, h, y, own, sides, end, clock)
+    S = one * S  # in every lane: where nothing depends on the states, a derivative has a single one
+    if clear == 0:
+        y, S = one_by_one_jacobian(t, dt, count, x, R, p)
+    return y, S

@@ -138,9 +138,10 @@ def arrive(p):
 @outlined
 def cross(t, x, e, p):
     """Go over to the other side of event e: what the rates jump by, over the rate of the event, and its derivative by x."""
-    before = events_into(t, x, p, 0)
-    rate = p.work[EVENTS + e]
+    events_into(t, x, p, 0)
+    rate, before = p.work[EVENTS + e], dynamics_beside(t, x, p)
     p.sides[e] = -p.sides[e]
-    after = events_into(t, x, p, 0)
+    events_into(t, x, p, 0)
+    after = dynamics_beside(t, x, p)
     p.work[e] = 0.0
     return (1.0 / rate if fabs(rate) > 0.0 else 0.0) * (after - before), event_row(t, x, p, e)

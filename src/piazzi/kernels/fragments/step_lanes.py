@@ -6,20 +6,13 @@ from piazzi.kernels.vocabulary import *  # noqa: F403
 @inline
 def propagate_lanes(t, dt, count, x, p):
     """The states `dt` seconds later."""
-    h = dt / count
-    y = substep(t, h, remember(x), p)
-    for i in range(1, count):
-        y = substep(t + i * h, h, y, p)
-    return y
+    return arc_lanes(t, dt, count, remember(x), p)
 
 
 @inline
 def transition_lanes(t, dt, count, x, p):
     """The states `dt` seconds later, and their derivatives with respect to the states now."""
-    h = dt / count
-    y, R = substep_jacobian(t, h, remember(x), first_rows(), p)
-    for i in range(1, count):
-        y, R = substep_jacobian(t + i * h, h, y, R, p)
+    y, R = arc_lanes_jacobian(t, dt, count, remember(x), first_rows(), p)
     return y, complete(R)
 
 
