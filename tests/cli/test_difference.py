@@ -54,3 +54,23 @@ def test_a_file_of_measurements_is_no_orbit(call, data_dir, gps):
     assert (
         "holds measurements, no orbit" in call("difference", gps, data_dir / "tdm/TDMExample8.txt", "--object", "G01").refused()
     )
+
+
+@pytest.mark.slow  # the kernels of a scenario's truth
+def test_the_truth_of_a_scenario_is_an_orbit(call, tmp_path):
+    """It begins where the prior is drawn from, and the sigma of its propagated prior is about right; the same run is the same."""
+    predicted = tmp_path / "predicted.oem"
+    assert call("propagate", "sun-sync-day", "-o", predicted).status == 0
+    found = call("difference", "sun-sync-day", predicted, "--seed", "3", "--json").document
+    assert found["count"] == 289
+    assert 0.01 < found["in_sigma"]["rms"]["T"] < 4.0
+    assert call("difference", predicted, "sun-sync-day", "--seed", "3", "--json").document["rms"]["3d"] == pytest.approx(
+        found["rms"]["3d"], rel=1e-3
+    )
+    assert call("simulate", "sun-sync-day", "--seed", "3", "-o", tmp_path / "run.nc").status == 0
+    same = call("difference", "sun-sync-day", tmp_path / "run.nc", "--seed", "3", "--json").document
+    assert same["rms"]["3d"] == 0.0
+
+
+def test_a_scenario_in_the_plane_is_no_orbit_about_the_earth(call, gps):
+    assert "b612-range is no orbit about the Earth" in call("difference", gps, "b612-range", "--object", "G01").refused()

@@ -186,3 +186,27 @@ def test_real_orbits_thinned_and_whole(data_dir):
 def test_what_cannot_be_compared_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_the_truth_of_a_tracking_is_an_orbit():
+    t = 60.0 * np.arange(121)
+    r, v = propagate_kepler(R, V, MU, t)
+    forces = earth.Forces(degree=2, bodies=(), tides=(), relativity=False)
+    position = pz.Sensor("position", {"px": "x", "py": "y", "pz": "z"})
+    problem = pz.Problem(
+        forces.model([position]),
+        pz.Gaussian(np.concatenate([R, V]), [1.0] * 6),
+        stations=[pz.Station("own", "position", [1.0, 1.0, 1.0])],
+        parameters=forces.values,
+        functions=forces.functions(START),
+        epoch=START,
+    )
+    tracking = pz.Tracking(t, r, None, np.hstack([r, v]), START)
+    found = pz.difference((problem, tracking), arc(offset=(1.0, -2.0, 3.0)))
+    assert_allclose(found.rms, [1, 2, 3], atol=1e-8)
+    assert found.covered is None
+    with pytest.raises(ValueError, match="has no truth"):
+        pz.difference((problem, pz.Tracking(t, r, None, None, START)), arc())
+    plane, simulated = pz.load("b612-range")
+    with pytest.raises(ValueError, match="b612-range is no orbit about the Earth: its states are x, y, vx, vy"):
+        pz.difference((plane, simulated), arc())

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+from typing import Any
+
 import click
 
 from piazzi.cli import options, output
 from piazzi.cli.running import DONE
 
 PICTURES = (".png", ".pdf", ".svg")
+TRUTHS = (".toml", ".npz", ".nc")
 
 
 @click.command(cls=options.Command)
@@ -20,6 +24,7 @@ PICTURES = (".png", ".pdf", ".svg")
 @click.option("--step", metavar="SECONDS", type=float, help="Time step.  [default: the rows of A]")
 @click.option("--object", "chosen", metavar="NAME", help="Object in files of several, by name or identifier.")
 @click.option("--degree", metavar="N", type=options.WholeNumber(1), help="Of the polynomial between rows.  [default: chosen]")
+@options.seed
 @options.output("Draw the difference over time, as .png, .pdf or .svg.")
 @options.as_json
 def command(
@@ -30,25 +35,28 @@ def command(
     step: float | None,
     chosen: str | None,
     degree: int | None,
+    seed: int,
     output_file: str | None,
     as_json: bool,
 ) -> int:
     """Show how far orbit B is from orbit A.
 
-    A and B are files of orbits: OEM, SP3, CPF, two-line elements, OMM; .gz and .Z are read as they are. The difference is B
-    minus A at the rows of A that both cover, along the radial, transverse and normal axes of A: root mean square, mean and
-    maximum, and where a file has covariances or accuracies, in sigma, with the share inside, which is right for
-    independent data only. Between rows states are those of a polynomial, whose degree and error are said.
+    A and B are files of orbits: OEM, SP3, CPF, two-line elements, OMM; .gz and .Z are read as they are. A scenario stands for
+    the truth that is simulated with --seed, a recording for its own. The difference is B minus A at the rows of A that both
+    cover, along the radial, transverse and normal axes of A: root mean square, mean and maximum, and where a file has
+    covariances or accuracies, in sigma, with the share inside, which is right for independent data only. Between rows
+    states are those of a polynomial, whose degree and error are said.
 
     Examples:
       piazzi difference fit.oem precise.sp3 --object G01
+      piazzi difference sun-sync-day fit.oem --seed 3
       piazzi difference old.tle new.oem --axes TNW -o apart.png
       piazzi difference a.oem b.oem --span "2016-02-13T16:00:00 UTC .." --json
     """
     output.check_output(output_file, PICTURES)
     from piazzi.orbit import difference
 
-    found = difference(first, second, axes, _span(span), step=step, object=chosen, degree=degree)
+    found = difference(_orbit(first, seed), _orbit(second, seed), axes, _span(span), step=step, object=chosen, degree=degree)
     wrote = []
     if output_file is not None:
         from piazzi.present.figures.difference import difference_page
@@ -62,6 +70,17 @@ def command(
 
     output.print_rich(Differing(found.to_dict()), *wrote)
     return DONE
+
+
+def _orbit(text: str, seed: int) -> Any:
+    """The name of a file, or a problem and its tracking with a truth."""
+    from piazzi.scenarios import names
+
+    if not text.lower().endswith(TRUTHS) and (text not in names() or os.path.exists(text)):
+        return text
+    from piazzi import load
+
+    return load(text, seed=seed)
 
 
 def _span(text: str | None) -> tuple[str | None, str | None] | None:

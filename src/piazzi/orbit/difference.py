@@ -119,8 +119,8 @@ def difference(
     Parameters
     ----------
     a, b : each a file (OEM, OPM, OCM, SP3, CPF, two-line elements, OMM), an `Ephemeris`, one of its arcs, mean elements,
-    or a function
-        that takes a list of Epochs and gives position (m) and velocity (m/s), (K, 3) each, in the GCRF
+        what `pz.load` gives of a scenario or a recording with its truth, or a function that takes a list of Epochs and gives
+        position (m) and velocity (m/s), (K, 3) each, in the GCRF
     axes : RTN or TNW of `a` at each time, or a frame of `piazzi.earth.FRAMES`
     span : first and last date, Epochs or text with a scale; None is open
     step : seconds between times, where they are not those of the rows of `a` (or of `b`, where `a` has none)
@@ -134,16 +134,14 @@ def difference(
     Raises
     ------
     ValueError
-        Where the orbits have no time in common, a file has several objects and none is said, positions are about
-        another body or
-        in axes that nobody says, or nothing says at which times to compare.
+        Where the orbits have no time in common, a file has several objects and none is said, positions are about another
+        body or in axes that nobody says, or nothing says at which times to compare.
 
     Notes
     -----
     Rows are turned into the GCRF, and states between them are those of Hermite's polynomial where there are velocities, of
     Lagrange's where there are none.  In sigma the difference is by the sum of both covariances, which is right for
-    independent
-    data only.
+    independent data only.
     """
     if axes not in ("RTN", "TNW", *FRAMES):
         raise ValueError(f"axes {axes!r} are not known; there are RTN, TNW, {', '.join(FRAMES)}")

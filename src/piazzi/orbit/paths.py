@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from piazzi.earth import Epoch, rotation, transform
+from piazzi.earth.forces import STATES
 from piazzi.earth.rotation import frame_named
 from piazzi.formats import Arc, Ephemeris, read_ephemeris
 from piazzi.formats.ephemeris import MeanElements
@@ -158,20 +159,47 @@ def opened(what: Any, chosen: str | None) -> tuple[str, Any]:
         return what.name or "mean elements", what
     if isinstance(what, Ephemeris):
         name = os.path.basename(what.file) or "ephemeris"
-        objects = [
-            o for o in what.objects if chosen is None or o == chosen or (what.of(o) and what.of(o)[0].identifier == chosen)
-        ]
+        objects = list(what.objects)
+        if chosen is not None and len(objects) > 1:
+            objects = [o for o in objects if o == chosen or (what.of(o) and what.of(o)[0].identifier == chosen)]
         if len(objects) != 1:
             listed = ", ".join(what.objects[:8]) + (f" and {len(what.objects) - 8} more" if len(what.objects) > 8 else "")
             raise ValueError(
                 f"{name} holds {listed or 'no orbit'}; " + ("say which object" if chosen is None else f"not {chosen}")
             )
         return name, what.of(objects[0]) or next(m for m in what.mean if m.name == objects[0])
+    if isinstance(what, tuple) and len(what) == 2 and hasattr(what[1], "truth"):
+        return what[0].name or "truth", truth_of(*what)
     if callable(what):
         return str(getattr(what, "__name__", "function")), what
     raise ValueError(
-        f"an orbit is a file, an Ephemeris, an Arc, MeanElements or a function of dates, not a {type(what).__name__}"
+        "an orbit is a file, an Ephemeris, an Arc, MeanElements, a problem with its tracking or a function of dates, "
+        f"not a {type(what).__name__}"
     )
+
+
+def truth_of(problem: Any, tracking: Any) -> tuple[Arc]:
+    """The truth of a tracking as an arc.
+
+    Raises
+    ------
+    ValueError
+        Where there is none, no date, or states are not those of an orbit about the Earth.
+    """
+    who, states = problem.name or "the tracking", list(problem.model.states)
+    if not {*STATES} <= {*states} or not {"field", "fixed", "free"} <= {*problem.functions}:
+        raise ValueError(f"{who} is no orbit about the Earth: its states are {', '.join(states)}")
+    if problem.epoch is None:
+        raise ValueError(f"{who} has no epoch: its truth has no dates")
+    if tracking.truth is None:
+        raise ValueError(f"{who} has no truth")
+    x = tracking.truth[:, [states.index(name) for name in STATES]]
+    return (
+        Arc(
+            epoch=problem.epoch, t=tracking.times, position=x[:, :3], velocity=x[:, 3:], name=who, centre="EARTH", frame="GCRF",
+            scale="UTC",
+        ),
+    )  # fmt: skip
 
 
 def path_of(name: str, what: Any, zero: Epoch, degree: int | None) -> Path:
