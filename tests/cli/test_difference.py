@@ -58,7 +58,7 @@ def test_a_file_of_measurements_is_no_orbit(call, data_dir, gps):
 
 @pytest.mark.slow  # the kernels of a scenario's truth
 def test_the_truth_of_a_scenario_is_an_orbit(call, tmp_path):
-    """It begins where the prior is drawn from, and the sigma of its propagated prior is about right; the same run is the same."""
+    """It is within the sigma of the propagated prior, and a recording of the same run is the same orbit."""
     predicted = tmp_path / "predicted.oem"
     assert call("propagate", "sun-sync-day", "-o", predicted).status == 0
     found = call("difference", "sun-sync-day", predicted, "--seed", "3", "--json").document
