@@ -24,7 +24,7 @@ class Drawn:
         ----------
         ax : matplotlib Axes
         options : what to draw: ``problem`` and ``component`` of a `Tracking`, ``state`` of an `Estimate`, ``group`` of a
-            `Comparison`, a `WindowTrade` or a study
+            `Comparison`, a `WindowTrade` or a study, ``against`` (what was varied) and ``measure`` of a study
 
         Raises
         ------

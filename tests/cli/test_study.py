@@ -142,7 +142,7 @@ def test_pictures(call, tmp_path):
 
 
 def test_report_page(call, tmp_path):
-    """A tab for each point, with every line of the table; a hostile name is text."""
+    """The whole grid and each point, with every line of the table; a hostile name is text; --title is the page's."""
     path = tmp_path / "<b>.toml"
     path.write_text(call("scenarios", "show", "b612-range").out.replace("Probe around", "<script>"))
     arguments = ["--with", "ekf", "--with", "window:5", "--vary", "R.scale=1,4", "--report", tmp_path / "page"]
@@ -150,11 +150,15 @@ def test_report_page(call, tmp_path):
     assert result.status == 0, result.err
     assert result.out.splitlines()[-1] == f"Wrote {tmp_path / 'page' / 'report.html'}"
     page = (tmp_path / "page" / "report.html").read_text()
-    assert page.count('<article class="tab"') == 2
+    assert page.count('<article class="tab"') == 3
+    assert '<select data-axis="0"><option value="1">1</option><option value="4">4</option></select>' in page
     assert "R.scale = 4" in page
     assert page.count("window:5") >= 4
     assert "<script> B612" not in page
     assert "&lt;script&gt; B612" in page
+    named = call("study", "b612-range", *FAST, "--title", "Mine & yours", "--report", tmp_path / "other.html")
+    assert named.status == 0
+    assert "<title>Mine &amp; yours</title>" in (tmp_path / "other.html").read_text()
 
 
 @pytest.mark.slow

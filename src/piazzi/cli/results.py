@@ -95,6 +95,17 @@ def report_option(function: F) -> F:
     )(function)
 
 
+def title_option(function: F) -> F:
+    """Option --title, of the page and the pictures."""
+    return click.option("--title", metavar="TEXT", expose_value=True, help="Title of the page and the pictures.")(function)
+
+
+def given_title() -> str | None:
+    """What --title says, None where it says nothing."""
+    title = _parameters().get("title")
+    return str(title) if title else None
+
+
 def check_report(path: str | None) -> None:
     """Make the folder of the page, and refuse a place that cannot be written, before anything is computed."""
     if path is None:
@@ -127,12 +138,15 @@ def write_page(path: str, tabs: Sequence[Tab], title: str | None = None) -> Path
     from piazzi import __version__
     from piazzi.present.report import write_page as write
 
-    shown = title or f"Piazzi report: {tabs[0].title if len(tabs) == 1 else f'{len(tabs)} problems'}"
+    problems = [tab for tab in tabs if not tab.at]
+    named = problems[0].title if len(problems) == 1 else f"{len(problems)} problems"
+    shown = given_title() or title or f"Piazzi report: {named}"
     sources = _sources()
     told = [
-        replace(tab, sections=[*tab.sections, _made(sources[i] if len(sources) == len(tabs) else None)])
-        for i, tab in enumerate(tabs)
+        replace(tab, sections=[*tab.sections, _made(sources[i] if i < len(sources) in (1, len(problems)) else None)])
+        for i, tab in enumerate(problems)
     ]
+    told += [tab for tab in tabs if tab.at]
     return write(path, shown, told, foot=f"Made by Piazzi {__version__}. The page needs no network.")
 
 
@@ -144,7 +158,7 @@ def _parameters() -> dict[str, Any]:
 def _sources() -> list[str]:
     """The sources that the command was given, the scenario of theirs in their place."""
     given = _parameters()
-    named = given.get("sources") or ([given["source"]] if given.get("source") else [])
+    named = given.get("sources") or [one for one in (given.get("source") or given.get("scenario"),) if one]
     return [str(given.get("scenario") or one) for one in named]
 
 

@@ -35,6 +35,7 @@ ENDINGS = (".nc",)
 @click.option("--chunk", type=options.WholeNumber(1), metavar="N", help="Runs per task.  [default: about a second's]")
 @click.option("--figures", metavar="FOLDER", help="Write pictures there.")
 @results.report_option
+@results.title_option
 @options.as_json
 @options.seed
 def command(
@@ -49,6 +50,7 @@ def command(
     chunk: int | None,
     figures: str | None,
     report: str | None,
+    title: str | None,
     as_json: bool,
     seed: int,
 ) -> int:
@@ -88,12 +90,12 @@ def command(
         if figures is not None:
             from piazzi.present.figures.studies import write_figures
 
-            wrote += [f"Wrote {file}" for file in write_figures(figures, summary)]
+            wrote += [f"Wrote {file}" for file in write_figures(figures, summary, title or "")]
         if report is not None:
             from piazzi.present.report import study_tabs
 
-            title, _ = results.title_and_planet(scenario, study.name, None)
-            wrote.append(f"Wrote {results.write_page(report, study_tabs(summary, title))}")
+            title = title or results.title_and_planet(scenario, study.name, None)[0]
+            wrote.append(f"Wrote {results.write_page(report, study_tabs(summary, title), f'Piazzi report: {title}')}")
         if as_json:
             output.print_json(summary.to_dict())
         else:

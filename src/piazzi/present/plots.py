@@ -13,14 +13,17 @@ from piazzi.evaluate.metrics import errors
 from piazzi.evaluate.observable import Observability
 from piazzi.evaluate.window_trade import WindowTrade
 from piazzi.present.figures.errors import SIGMAS, claim_overlay, error_overlay, state_error
+from piazzi.present.figures.grids import against as drawn_against
 from piazzi.present.figures.measured import measurements
 from piazzi.present.figures.sight import bound_sigmas
 from piazzi.present.figures.studies import point_of, study_errors
 from piazzi.present.figures.style import MEASURED, RC, STATIONS, drawn, plain, shade_of, time_axis
 from piazzi.present.figures.trade import window_trade
+from piazzi.present.grid import measures
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.study import Stored, Summary
+from piazzi.study.grid import Grid
 from piazzi.text import nearest
 
 if TYPE_CHECKING:
@@ -100,20 +103,32 @@ def _observability(result: Observability, ax: Axes) -> Axes:
 
 
 @_on.register(Summary)
-def _study(result: Summary, ax: Axes, group: str | None = None, point: int = 0) -> Axes:
-    """Root mean square errors of a group of states at a point of the grid."""
+def _study(
+    result: Summary, ax: Axes, group: str | None = None, point: int = 0, against: str | None = None, measure: str = ""
+) -> Axes:
+    """Root mean square errors of a group of states at a point of the grid; or a measure `against` what was varied.
+
+    A measure is an error by its group, "NEES" or "divergence"; other axes of the grid have the values of the point, settings
+    of estimators at their first.
+    """
     points = len(result.stored.points)
     if not 0 <= point < points:
         raise ValueError(f"point is {point}; there are {points}, counted from 0")
     at = point_of(result, point)
+    if against is not None:
+        grid, known = Grid.of(result), {m.name: m for m in measures(result)}
+        axis = _one_of(against, list(grid.axes), "axis")
+        name = _one_of(f"{group} error" if group else measure or None, list(known), "measure")
+        rest = {n: at.get(n, values[0]) for n, values in grid.axes.items() if n != axis}
+        return _legend(drawn_against(ax, grid, axis, known[name], rest))
     lines = [line for line in result.lines if line.point == at]
     return _legend(study_errors(ax, result, lines, _one_of(group, result.stored.groups, "group")))
 
 
 @_on.register(Stored)
-def _stored(result: Stored, ax: Axes, group: str | None = None, point: int = 0) -> Axes:
+def _stored(result: Stored, ax: Axes, **options: Any) -> Axes:
     """As of its summary."""
-    return _study(result.summary, ax, group, point)
+    return _study(result.summary, ax, **options)
 
 
 def _one_of(given: str | None, known: Sequence[str], what: str) -> str:

@@ -87,6 +87,7 @@ class Line:
     rmse, rmse_last_half : by group, root mean square over runs
     rmse_last_half_quantiles : by group, of single runs at `QUANTILES`
     over_bound : by group, rmse_last_half over the Cramer-Rao bound, both of the runs that the bound is of
+    mean_nees_last_half_quantiles : of single runs at `QUANTILES`
     mean_nees, mean_nees_last_half, median_nees_last_half, mean_nis, seconds, iterations : over runs
     """
 
@@ -104,6 +105,7 @@ class Line:
     mean_nees: float | None
     mean_nees_last_half: float | None
     median_nees_last_half: float | None
+    mean_nees_last_half_quantiles: tuple[float, ...] | None
     mean_nis: float | None
     seconds: float | None
     iterations: float | None
@@ -117,10 +119,11 @@ class Line:
         return {
             "point": dict(self.point),
             **{k: getattr(self, k) for k in ("estimator", "view", "runs", "failed", "diverged")},
-            "diverged_interval": None if self.diverged_interval is None else list(self.diverged_interval),
+            "diverged_interval": _listed(self.diverged_interval),
             **{k: {g: list(v) if isinstance(v, tuple) else v for g, v in getattr(self, k).items()} for k in groups},
             **{k: getattr(self, k) for k in numbers},
-            "nees_bounds": None if c.band is None else list(c.band),
+            "mean_nees_last_half_quantiles": _listed(self.mean_nees_last_half_quantiles),
+            "nees_bounds": _listed(c.band),
             "nees_inside": c.inside,
             "nees_ideal": c.ideal,
             "over_time": {
@@ -162,6 +165,7 @@ def line_of(
         _mean(found.numbers["mean_nees"][good]),
         _mean(found.numbers["mean_nees_last_half"][good]),
         _median(found.numbers["mean_nees_last_half"][good]),
+        _quantiles(found.numbers["mean_nees_last_half"][good]),
         _mean(found.numbers["mean_nis"][good]),
         _mean(found.numbers["seconds"][good]),
         _mean(found.numbers["iterations"][good]),
@@ -213,6 +217,10 @@ def _rms(groups: list[str], values: Array) -> dict[str, float | None]:
 def _quantiles(values: Array) -> tuple[float, ...] | None:
     known = values[np.isfinite(values)]
     return tuple(np.quantile(known, QUANTILES).tolist()) if known.size else None
+
+
+def _listed(values: tuple[float, ...] | None) -> list[float] | None:
+    return None if values is None else list(values)
 
 
 def _mean(values: Array) -> float | None:

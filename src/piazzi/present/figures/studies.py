@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from piazzi.present.figures.grids import grid_pages
 from piazzi.present.figures.pages import save
 from piazzi.present.figures.style import RC, label_of, line_of, plain, plain_ticks, time_axis
+from piazzi.present.grid import file_name
 from piazzi.present.study_table import group_display, ideal_nees, point_name, widest_bounds
 from piazzi.study import Line, Summary
 from piazzi.text import printable
@@ -21,23 +23,25 @@ MOST_POINTS = 12  # that get pictures of their own
 FEW = 4  # lines whose bands can be told apart
 
 
-def write_figures(folder: str | os.PathLike[str], summary: Summary) -> list[Path]:
+def write_figures(folder: str | os.PathLike[str], summary: Summary, title: str = "") -> list[Path]:
     """Write the pictures of a study as PNG; returns their paths, raises OSError."""
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
-    return [save(figure, place / f"{name}.png") for name, figure in study_pages(summary)]
+    return [save(figure, place / f"{name}.png") for name, figure in study_pages(summary, title)]
 
 
-def study_pages(summary: Summary) -> Iterator[tuple[str, Figure]]:
+def study_pages(summary: Summary, title: str = "") -> Iterator[tuple[str, Figure]]:
     """Names and figures of the pictures of a study, drawn one at a time."""
     from matplotlib import rc_context
 
+    yield from grid_pages(summary, _heading(summary, title))
+    rows = len(summary.stored.rows)
     for index in range(min(len(summary.stored.points), MOST_POINTS)):
-        lines = [line for line in summary.lines if line.point == point_of(summary, index)]
-        tail = f"-{index}" if len(summary.stored.points) > 1 else ""
+        lines = list(summary.lines[index * rows : (index + 1) * rows])
+        tail = f"-{file_name(point_of(summary, index))}" if len(summary.stored.points) > 1 else ""
         for name, draw in (("errors", error_page), ("nees", nees_page), ("cost", cost_page)):
             with rc_context(RC):
-                yield f"study-{name}{tail}", draw(summary, lines)
+                yield f"study-{name}{tail}", draw(summary, lines, title)
 
 
 def point_of(summary: Summary, index: int) -> dict[str, Any]:
@@ -45,15 +49,15 @@ def point_of(summary: Summary, index: int) -> dict[str, Any]:
     return dict(zip(summary.stored.about["axes"], summary.stored.points[index], strict=True))
 
 
-def error_page(summary: Summary, lines: list[Line]) -> Figure:
+def error_page(summary: Summary, lines: list[Line], title: str = "") -> Figure:
     """For each group of states the root mean square error over runs, and the Cramer-Rao bound; a few lines have bands."""
     stored = summary.stored
     figure = _figure(8.0, 2.6 * len(stored.groups) + 0.6)
     for i, group in enumerate(stored.groups):
         ax = study_errors(figure.add_subplot(len(stored.groups), 1, i + 1), summary, lines, group)
         if i == 0:
-            ax.legend(ncols=3, fontsize=7)
-    _title(figure, summary, lines, f"root mean square{'; shaded, 5 to 95 % of runs' if len(lines) <= FEW else ''}")
+            figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=7)
+    _title(figure, summary, lines, title, f"root mean square{'; shaded, 5 to 95 % of runs' if len(lines) <= FEW else ''}")
     return figure
 
 
@@ -78,7 +82,7 @@ def study_errors(ax: Axes, summary: Summary, lines: list[Line], group: str) -> A
     return ax
 
 
-def nees_page(summary: Summary, lines: list[Line]) -> Figure:
+def nees_page(summary: Summary, lines: list[Line], title: str = "") -> Figure:
     """Mean NEES over runs with the bounds that it should keep."""
     stored = summary.stored
     figure = _figure(8.0, 3.6)
@@ -93,12 +97,12 @@ def nees_page(summary: Summary, lines: list[Line]) -> Figure:
     ax.set_yscale("log")
     plain_ticks(ax)
     ax.set_ylabel("mean NEES over runs")
-    ax.legend(ncols=3, fontsize=7)
-    _title(figure, summary, lines, ideal_nees(lines))
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=7)
+    _title(figure, summary, lines, title, ideal_nees(lines))
     return figure
 
 
-def cost_page(summary: Summary, lines: list[Line]) -> Figure:
+def cost_page(summary: Summary, lines: list[Line], title: str = "") -> Figure:
     """What a run costs, and how far its errors in the last half are from the least possible."""
     stored = summary.stored
     group = stored.groups[0]
@@ -110,22 +114,27 @@ def cost_page(summary: Summary, lines: list[Line]) -> Figure:
             continue
         style = line_of(line.estimator, line.view, names)
         ax.plot(line.seconds * 1e3, value, marker="o" if line.view == "realtime" else "s", linestyle="", color=style["color"])
-        text = plain(label_of(line.estimator, line.view))
-        ax.annotate(text, (line.seconds * 1e3, value), xytext=(5, 3), textcoords="offset points", fontsize=7)
+        text, place = plain(label_of(line.estimator, line.view)), (5, 3 if line.view == "realtime" else -9)
+        ax.annotate(text, (line.seconds * 1e3, value), xytext=place, textcoords="offset points", fontsize=7)
     ax.set_xscale("log")
     ax.set_yscale("log")
     plain_ticks(ax)
+    ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     ax.set_xlabel("time of one run [ms]")
     ax.set_ylabel(plain(f"{printable(group)} RMSE, last half, over its bound"))
-    _title(figure, summary, lines, "circles, real time; squares, delayed")
+    _title(figure, summary, lines, title, "circles, real time; squares, delayed")
     return figure
 
 
-def _title(figure: Figure, summary: Summary, lines: list[Line], remark: str) -> None:
-    about = summary.stored.about["specification"]
+def _title(figure: Figure, summary: Summary, lines: list[Line], title: str, remark: str) -> None:
     where = point_name(lines[0].point)
-    text = f"{about['name'] or 'study'}: {about['runs']:,} runs{f', {where}' if where else ''}; {remark}"
+    text = f"{_heading(summary, title)}{f', {where}' if where else ''}; {remark}"
     figure.suptitle(plain(text), fontsize=10, x=0.01, ha="left")
+
+
+def _heading(summary: Summary, title: str = "") -> str:
+    about = summary.stored.about["specification"]
+    return f"{title or about['name'] or 'study'}: {about['runs']:,} runs"
 
 
 def _figure(width: float, height: float) -> Figure:

@@ -35,7 +35,8 @@ class Key:
 class Axis:
     """A label, the unit to show, the scale, and limits in SI units.
 
-    A symmetric scale is linear up to `threshold` and logarithmic beyond.
+    A symmetric scale is linear up to `threshold` and logarithmic beyond.  `marks` are values with their words, instead of
+    numbers that suit the scale.
     """
 
     label: str
@@ -44,11 +45,12 @@ class Axis:
     low: float | None = None
     high: float | None = None
     threshold: float = 0.0
+    marks: Sequence[tuple[float, str]] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Values against x: a line, points, thick spans, or a band of +-y about zero, or about the values `about`.
+    """Values against x: a line, points, thick spans, a band of +-y about zero, or about `about`, or a spread from that to y.
 
     `key` is the index of its legend entry, -1 for none.  `notes` are words on each value, "" for none, shown under the pointer.
 
@@ -59,7 +61,7 @@ class Line:
     y: Array | tuple[Array, ...]
     label: str
     key: int = -1
-    kind: Literal["line", "points", "crosses", "band", "bars", "spans"] = "line"
+    kind: Literal["line", "points", "crosses", "band", "bars", "spans", "spread"] = "line"
     times: float = 1.0
     colour: str = "#7A7A7A"
     dash: tuple[int, ...] = ()
@@ -118,6 +120,18 @@ class Orbit:
     limits: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     planet_radius: float | None = None
     close: bool = False
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Heat:
+    """A cell for every value of two axes, row by row from below: its colour, that of its letters, its number and its words."""
+
+    title: str
+    labels: tuple[str, str]
+    marks: tuple[Sequence[str], Sequence[str]]
+    measure: str
+    cells: Sequence[Sequence[tuple[str, str, str]]]
     note: str = ""
 
 
@@ -225,7 +239,7 @@ class Sky:
     note: str = ""
 
 
-Block = Chart | Orbit | Table | CursorValues | Text | Code | World | Sky
+Block = Chart | Heat | Orbit | Table | CursorValues | Text | Code | World | Sky
 
 
 @dataclass(frozen=True)
@@ -242,7 +256,8 @@ class Section:
 class Tab:
     """One problem, or one study: a summary first, then sections.  With `times` (K,) it has a cursor and can be played.
 
-    Where it is not to `switch`, its keys are not offered to be switched.
+    Where it is not to `switch`, its keys are not offered to be switched.  Tabs with values of what was varied, `at`,
+    are picked by them, beside those without.
     """
 
     title: str
@@ -253,3 +268,4 @@ class Tab:
     times: Array | None = None
     show_time: Display = field(default_factory=lambda: Display("s"))
     switch: bool = True
+    at: Sequence[tuple[str, str]] = ()

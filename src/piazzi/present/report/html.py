@@ -23,13 +23,36 @@ def text(words: str) -> str:
 
 
 def tab_chooser(tabs: Sequence[Tab]) -> str:
-    """A button for every tab."""
+    """A button for every tab; those with values of what was varied share one, and a list of values for each number."""
+    if any(tab.at for tab in tabs):
+        return _picker(tabs)
     buttons = "".join(
         f'<button type="button" role="tab" id="tab-t{n}" aria-controls="t{n}" aria-selected="{"true" if n == 0 else "false"}"'
         f' tabindex="{0 if n == 0 else -1}">{text(tab.title)}</button>'
         for n, tab in enumerate(tabs)
     )
     return f'<nav class="wide" role="tablist" aria-label="Problems">{buttons}</nav>'
+
+
+def _picker(tabs: Sequence[Tab]) -> str:
+    values: dict[str, dict[str, None]] = {}
+    for name, value in (pair for tab in tabs for pair in tab.at):
+        values.setdefault(name, {})[value] = None
+    lists = "".join(
+        f'<label>{text(name)} <select data-axis="{i}">'
+        + "".join(f'<option value="{text(v)}">{text(v)}</option>' for v in found)
+        + "</select></label>"
+        for i, (name, found) in enumerate(values.items())
+    )
+    whole = "".join(
+        f'<button type="button" class="quiet" data-tab="{n}" aria-pressed="false">Whole grid</button>'
+        for n, tab in enumerate(tabs)
+        if not tab.at
+    )
+    return (
+        f'<nav class="wide picker" aria-label="Points of the grid">{whole}'
+        f'<button type="button" class="quiet" data-tab="at" aria-pressed="false">One point</button>{lists}</nav>'
+    )
 
 
 def legend(lines: Sequence[Line]) -> str:

@@ -14,6 +14,7 @@ from piazzi.present.report.blocks import (
     Chart,
     Code,
     CursorValues,
+    Heat,
     Line,
     Orbit,
     Section,
@@ -25,7 +26,7 @@ from piazzi.present.report.blocks import (
     World,
 )
 from piazzi.present.report.html import Pool, line_mark, script_json, text
-from piazzi.present.report.places import axis_data, display_data, noted, sky_data, world_data
+from piazzi.present.report.places import axis_data, display_data, heat_data, noted, sky_data, world_data
 from piazzi.text import printable
 
 SCRIPTS = (
@@ -37,6 +38,7 @@ SCRIPTS = (
     "globe.js",
     "map.js",
     "sky.js",
+    "heat.js",
     "save.js",
     "tab.js",
     "page.js",
@@ -126,6 +128,7 @@ class _Builder:
             "times": None if tab.times is None else self.pool.add_exactly(tab.times),
             "show": display_data(tab.show_time),
             "drawings": self.drawings,
+            "at": [[printable(name), printable(value)] for name, value in tab.at],
         }
 
     def _bar(self, tab: Tab) -> str:
@@ -173,6 +176,8 @@ class _Builder:
                 return self._drawing(block.title, block.note, self._chart(block), html.legend(block.lines))
             case Orbit():
                 return self._drawing(block.title, block.note, self._orbit(block))
+            case Heat():
+                return self._drawing(block.title, block.note, heat_data(block))
             case Table():
                 return html.table_panel(block)
             case CursorValues():

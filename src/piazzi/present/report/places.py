@@ -1,4 +1,4 @@
-"""Axes, globes, maps and skies as data of the page."""
+"""Axes, heat maps, globes, maps and skies as data of the page."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.evaluate.quantities import Display
-from piazzi.present.report.blocks import Axis, Rows, Sky, World
+from piazzi.present.report.blocks import Axis, Heat, Rows, Sky, World
 from piazzi.present.report.html import Pool
 from piazzi.problem.checks import Array
 from piazzi.text import printable
@@ -85,4 +85,16 @@ def axis_data(axis: Axis) -> Mapping[str, Any]:
         "low": axis.low,
         "high": axis.high,
         "threshold": axis.threshold,
+        "marks": [[value, printable(words)] for value, words in axis.marks],
+    }
+
+
+def heat_data(heat: Heat) -> dict[str, Any]:
+    """What a heat map draws."""
+    return {
+        "kind": "heat",
+        "labels": [printable(label) for label in heat.labels],
+        "marks": [[printable(mark) for mark in marks] for marks in heat.marks],
+        "measure": printable(heat.measure),
+        "cells": [[[*cell[:2], printable(cell[2])] for cell in row] for row in heat.cells],
     }

@@ -15,7 +15,8 @@ class Chart {
     }));
     for (const line of this.lines) {
       const about = line.about === null ? null : array(line.about);
-      line.upper = about ? line.y.map((v, i) => about[i] * fy + v) : line.y;
+      line.upper = about && line.kind !== "spread" ? line.y.map((v, i) => about[i] * fy + v) : line.y;
+      if (line.kind === "spread") [line.upper, line.lower] = [line.y, Array.from(about, (v) => v * fy)];
       if (line.kind === "band") line.lower = about ? line.y.map((v, i) => about[i] * fy - v) : line.y.map((v) => -v);
     }
     this.xAxis = scaled(spec.x, fx);
@@ -31,7 +32,7 @@ class Chart {
   limits() {
     const zoom = this.spec.time ? this.tab.zoom : null;
     const x = this.spec.time ? this.tab.span : extent(this.lines.map((l) => l.x), this.xAxis);
-    const y = extent(this.lines.map((l) => l.y), this.yAxis);
+    const y = extent(this.lines.flatMap((l) => (l.kind === "spread" ? [l.y, l.lower] : [l.y])), this.yAxis);
     const fx = this.spec.x.show[1];
     const whole = [this.yAxis.low ?? y[0], this.yAxis.high ?? y[1]];
     return {
@@ -76,10 +77,14 @@ class Chart {
       grid.append(element("line", { x1: left, x2: right, y1: at, y2: at, class: v === 0 ? "zero" : "" }));
       grid.append(element("text", { x: left - 6, y: at + 4, "text-anchor": "end" }, texts[i]));
     });
-    for (const v of ticks(this.sx, 70)) {
+    let free = -Infinity;
+    for (const [v, text] of this.spec.x.marks.length ? this.spec.x.marks.map(([v, words]) => [v * this.spec.x.show[1], words]) : ticks(this.sx, 70).map((v) => [v, tickText(v)])) {
       const at = this.sx.place(v);
       grid.append(element("line", { x1: at, x2: at, y1: bottom, y2: bottom + 4, class: "tick" }));
-      grid.append(element("text", { x: inward(at, tickText(v), width), y: bottom + 17, "text-anchor": "middle" }, tickText(v)));
+      const middle = inward(at, text, width);
+      if (middle - 3.6 * text.length < free) continue;
+      free = middle + 3.6 * text.length + 4;
+      grid.append(element("text", { x: middle, y: bottom + 17, "text-anchor": "middle" }, text));
     }
     grid.append(element("line", { x1: left, x2: right, y1: bottom, y2: bottom, class: "axis" }));
     svg.append(grid);
@@ -128,7 +133,10 @@ class Chart {
   drawLines() {
     for (const line of this.lines) {
       const style = { "data-key": line.key, stroke: line.colour, fill: "none" };
-      if (line.kind === "band") {
+      if (line.kind === "spread" && this.yAxis.scale === "linear") {
+        line.mark = element("path", { ...style, d: this.whiskers(line), class: "line" });
+        this.inside.append(line.mark);
+      } else if (line.lower) {
         const upper = this.path(line.x, line.upper);
         line.mark = element("path", { ...style, d: this.ribbon(line), fill: line.colour, stroke: "none", class: "band" });
         this.inside.append(line.mark);
@@ -204,6 +212,14 @@ class Chart {
     return out;
   }
 
+  // Beside each other, because those of estimators that are alike would hide one another.
+  whiskers({ x, key, lower, upper }) {
+    const aside = 5 * (key - (this.tab.keys.length - 1) / 2);
+    let out = "";
+    for (let i = 0; i < x.length; i++) if (!Number.isNaN(lower[i])) out += `M${(this.sx.place(x[i]) + aside).toFixed(1)} ${this.clamped(lower[i])}V${this.clamped(upper[i])}m-3 0h6`;
+    return out;
+  }
+
   sticks({ x, y }) {
     const foot = this.sy.from;
     let out = "";
@@ -238,7 +254,7 @@ class Chart {
   // Values of every line shown, at the epoch that is nearest to a time in seconds.
   at(x) {
     return this.lines
-      .filter((line) => this.shown(line) && line.x.length)
+      .filter((line) => this.shown(line) && line.x.length && line.kind !== "spread")
       .map((line) => {
         const i = nearest(line.x, x);
         const note = line.notes ? line.notes.words[line.notes.of[i]] : "";
@@ -252,11 +268,12 @@ class Chart {
     const rows = [["series", xs, ys, "note"]];
     for (const line of this.lines)
       line.x.forEach((x, i) => Number.isNaN(line.y[i]) || rows.push([line.name === line.label ? line.name : `${line.name}: ${line.label}`, x, line.y[i], line.notes ? line.notes.words[line.notes.of[i]] : ""]));
+    for (const line of this.lines.filter((l) => l.kind === "spread")) line.x.forEach((x, i) => Number.isNaN(line.lower[i]) || rows.push([`${line.name}: ${line.label}, lower end`, x, line.lower[i], ""]));
     return rows;
   }
 
   valueAtCursor(key) {
-    const line = this.lines.find((l) => l.key === key && l.kind !== "band");
+    const line = this.lines.find((l) => l.key === key && !l.lower);
     return line && line.x.length ? line.y[nearest(line.seconds, this.tab.time)] : NaN;
   }
 
@@ -304,7 +321,8 @@ class Chart {
       name: this.spec.single || line.key < 0 ? line.label : line.name,
       value: withUnit((line.kind === "band" ? "±" : "") + number(value), unit) + (note ? `, ${note}` : ""),
     }));
-    showTip(event, `${this.spec.time ? "" : `${this.spec.x.label} `}${withUnit(number(found[0].x), xUnit)}`, rows);
+    const mark = this.spec.x.marks.find(([v]) => v * this.spec.x.show[1] === found[0].x);
+    showTip(event, `${this.spec.time ? "" : `${this.spec.x.label} `}${mark ? mark[1] : withUnit(number(found[0].x), xUnit)}`, rows);
   }
 
   release(event) {

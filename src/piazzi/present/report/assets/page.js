@@ -30,6 +30,34 @@ function listenToTheme() {
   button.addEventListener("click", () => set(document.documentElement.dataset.theme !== "dark"));
 }
 
+// Points of a grid, of which each is made when it is picked first; what is switched off stays so.
+function listenToPicker(nav) {
+  const roots = DATA.tabs.map((spec) => document.getElementById(spec.id));
+  const lists = [...nav.querySelectorAll("select")];
+  const buttons = [...nav.querySelectorAll("button")];
+  const missing = element("span", { class: "remark", role: "status" });
+  nav.append(missing);
+  let last = null;
+  const choose = (chosen) => {
+    missing.textContent = chosen < 0 ? "This point is not on the page." : "";
+    if (chosen < 0) return;
+    roots.forEach((root, i) => root.classList.toggle("away", i !== chosen));
+    TABS.forEach((tab) => tab.stop());
+    const at = DATA.tabs[chosen].at.length > 0;
+    TABS[chosen] ??= new Tab(DATA.tabs[chosen]);
+    if (at && last && last !== TABS[chosen]) {
+      TABS[chosen].visible = new Set(last.visible);
+      TABS[chosen].refresh();
+    }
+    if (at) last = TABS[chosen];
+    for (const button of buttons) button.setAttribute("aria-pressed", button.dataset.tab === (at ? "at" : String(chosen)));
+  };
+  const pick = () => choose(DATA.tabs.findIndex(({ at }) => at.length && at.every(([, value], i) => lists[i].value === value)));
+  for (const list of lists) list.addEventListener("change", pick);
+  for (const button of buttons) button.addEventListener("click", () => (button.dataset.tab === "at" ? pick() : choose(Number(button.dataset.tab))));
+  choose(0);
+}
+
 function listenToTabs(tabs) {
   const buttons = [...document.querySelectorAll("[role=tab]")];
   const choose = (chosen) => {
@@ -54,12 +82,14 @@ function listenToTabs(tabs) {
   if (buttons.length) choose(0);
 }
 
-const TABS = DATA.tabs.map((spec) => new Tab(spec));
+const PICKER = document.querySelector(".picker");
+const TABS = PICKER ? [] : DATA.tabs.map((spec) => new Tab(spec));
 listenToTheme();
-listenToTabs(TABS);
+if (PICKER) listenToPicker(PICKER);
+else listenToTabs(TABS);
 addEventListener("beforeprint", () => {
   for (const fold of document.querySelectorAll("details")) fold.open = true;
-  TABS.forEach((tab) => tab.drawAll(400));
+  DATA.tabs.forEach((spec, i) => (TABS[i] ??= new Tab(spec)).drawAll(400));
 });
 addEventListener("afterprint", () => TABS.forEach((tab) => tab.drawAll()));
 document.documentElement.dataset.ready = "true";

@@ -20,7 +20,7 @@ class Tab {
     [this.select, this.whole, this.everyone] = [".focus select", ".unzoom", ".everyone"].map(find);
     this.drawings = [...this.root.querySelectorAll(".plot")].map((box) => {
       const drawing = spec.drawings[box.dataset.drawing];
-      return new { orbit: Orbit, chart: Chart, globe: Globe, map: WorldMap, sky: Sky }[drawing.kind](this, box, drawing);
+      return new { orbit: Orbit, chart: Chart, globe: Globe, map: WorldMap, sky: Sky, heat: Heat }[drawing.kind](this, box, drawing);
     });
     listenToSaving(this);
     this.columns = this.drawings.filter((d) => d.spec.column);
