@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from piazzi.determination.determining import determine
     from piazzi.determination.ephemerides import ephemeris
     from piazzi.determination.figures import figures
+    from piazzi.determination.following import Following
     from piazzi.determination.initial import initial_orbits
     from piazzi.determination.initial_result import InitialOrbits
     from piazzi.determination.result import Determination
@@ -131,6 +132,7 @@ _WHERE = {
         "piazzi.determination.determining": "determine",
         "piazzi.determination.ephemerides": "ephemeris",
         "piazzi.determination.figures": "figures",
+        "piazzi.determination.following": "Following",
         "piazzi.determination.initial": "initial_orbits",
         "piazzi.determination.initial_result": "InitialOrbits",
         "piazzi.determination.result": "Determination",
@@ -144,8 +146,8 @@ __version__ = "0.1.0"
 __all__ = [
     "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Determination", "Discrete",
     "DormandPrince", "DormandPrince5", "Ephemeris", "Epoch", "Estimate", "Estimated", "Euler", "ExtendedKalmanFilter",
-    "FactorGraph", "Forecast", "Function", "GaussJackson", "Gaussian", "Heun", "Huber", "InitialOrbits", "Integrator",
-    "Interpolation", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre", "Midpoint", "Model",
+    "FactorGraph", "Following", "Forecast", "Function", "GaussJackson", "Gaussian", "Heun", "Huber", "InitialOrbits",
+    "Integrator", "Interpolation", "Kepler", "LiveFilter", "LiveRootFilter", "LiveWindow", "Manoeuvre", "Midpoint", "Model",
     "Observability", "Observations", "Parameter", "Pass", "Prediction", "Problem", "ProcessNoise", "Propagation", "Ralston",
     "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter",
     "Station", "Study", "Table", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade",

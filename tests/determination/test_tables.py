@@ -59,10 +59,10 @@ def test_the_table_says_its_axes_and_frame_those_of_the_answer(table):
     from piazzi.determination import determining
 
     told = {"columns": COLUMNS, "scale": "GPS", "sigma": "0.1m", "frame": "ITRF"}
-    silent = determining._observations([str(table)], told)
+    silent = determining.observations_of([str(table)], told)
     assert silent.segments[0].frame == "ITRF" and any("not those of the answer" in text for text in silent.assumed)
     table.write_text("# frame = ITRF\n" + table.read_text())
-    named = determining._observations([str(table)], told | {"frame": "EME2000"})
+    named = determining.observations_of([str(table)], told | {"frame": "EME2000"})
     assert named.segments[0].frame == "ITRF" and not any("--frame" in text for text in named.assumed)
 
 

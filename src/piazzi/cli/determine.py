@@ -52,6 +52,8 @@ def command(files: tuple[str, ...], **given: Any) -> int:
     files, case = said_case(files, given)
     if case.each and case.object:
         raise click.UsageError("--object and --each do not go together", click.get_current_context())
+    if output.STDOUT in files and not case.follow:
+        raise click.UsageError("-: standard input is followed: add --follow", click.get_current_context())
     _check_outputs(case, read)
     if case.against is not None:
         from piazzi.formats import read_ephemeris
@@ -61,6 +63,8 @@ def command(files: tuple[str, ...], **given: Any) -> int:
     from piazzi.determination.determining import objects_in
     from piazzi.determination.initial_result import UndeterminedError
 
+    if case.follow:
+        return _follow(files, case)
     status = DONE
     for one in objects_in(files, case) if case.each else [case.object]:
         own = replace(case, object=one)
@@ -80,6 +84,27 @@ def command(files: tuple[str, ...], **given: Any) -> int:
         status = max(status, _status(result, case.strict))
         _print(result, case, wrote)
     return status
+
+
+def _follow(files: Sequence[str], case: Case) -> int:
+    """Carry an orbit on along a stream; products at its end."""
+    from piazzi.cli.following import follow
+    from piazzi.determination.case_text import write_case
+    from piazzi.determination.determining import plain_command
+    from piazzi.determination.showing import line
+
+    found = follow(files, case, {"command": plain_command(["piazzi", *sys.argv[1:]])})
+    if found is None:
+        return NOT_ESTIMATED
+    wrote = _write(found, case)
+    if case.save is not None:
+        write_case(case.save, case, found.setup)
+        wrote.append(f"Wrote {case.save}")
+    for text in wrote if case.json else ():
+        say(text)
+    if not case.json:
+        output.print_rich(line(found), *wrote)
+    return _status(found, case.strict)
 
 
 def _print_ridge(error: UndeterminedError, as_json: bool) -> None:

@@ -133,6 +133,10 @@ class Case:
     against: Any = asked(None, "FILE", "Compare with another orbit, at its rows within the span.", file=True)
     strict: bool = asked(False, "", "Exit 3 where any sentence of the verdict is false.", read.flag)
     anyway: bool = asked(False, "", "Write products of an orbit that is not determined too.", read.flag)
+    follow: bool = asked(
+        False, "", "Take the last TRACKING row by row as it is written, - for standard input; with ekf, window:6h, ...",
+        read.flag,
+    )  # fmt: skip
     show: bool = asked(False, "", "Show forces, unknowns, noise and assumptions, and stop.", read.flag)
     save: str | None = asked(None, "CASE", "Write a case (.toml) with all that was assumed filled in.", key=False)
     identifier: str | None = keyed("object", "id")

@@ -126,10 +126,11 @@ def determined(
     say = announce or (lambda step: None)
     chosen = estimators(case.with_)
     scale, _ = _instant(case.epoch)
-    axes = frame_named(case.frame) if case.frame else None
+    if case.frame:
+        frame_named(case.frame)
     say("reading")
     given = prepared(*tracking, case=case)
-    axes = None if _OF_ROWS.format(case.frame) in given.assumed else axes
+    axes = answer_axes(given, case.frame)
     say("approaching")
     centre = given.measured.centre
     return solved(
@@ -142,7 +143,7 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
     files, told = split(tracking)
     case = told.told(words) if case is None else case
     _, at = _instant(case.epoch)
-    seen, chosen, begin, earlier = _read(files, case)
+    seen, chosen, begin, earlier = read(files, case)
     begin = begin or unguided(seen, lambda first: posed(seen, chosen(first), first))
     return setup(seen, chosen(begin), begin, at=at, earlier=earlier)
 
@@ -151,14 +152,14 @@ def fitting_orbits(*tracking: Any, case: Case | None = None, **words: Any) -> In
     """All orbits that fit a tracking, of the same words as `determine`, whose guess is not asked for."""
     files, told = split(tracking)
     case = told.told(words) if case is None else case
-    seen, chosen, _, _ = _read(files, replace(case, guess=None, prior=None))
+    seen, chosen, _, _ = read(files, replace(case, guess=None, prior=None))
     return initial_orbits(posed(seen, chosen(first := first_look(seen)), first), seen.tracking)
 
 
-def _read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[[Guess], Chosen], Guess | None, Earlier | None]:
+def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[[Guess], Chosen], Guess | None, Earlier | None]:
     """What was measured, the forces on an orbit, where to begin where somebody says it, and the orbit of before."""
     wanted, burns = asked(case.estimate, case.consider), burns_of(case.manoeuvre)
-    rows = of_object(_observations(files, case.answers), case.object)
+    rows = of_object(observations_of(files, case.answers), case.object)
     rows, earlier = _beside_prior(rows, case)
     seen, begin = _seen(rows, case, earlier, any(one.what.kind == CLOCK for one in wanted))
     seen = with_instruments(seen, [one for one in wanted if one.what.kind in INSTRUMENTS])
@@ -216,7 +217,7 @@ def _seen(rows: Observations, case: Case, earlier: Earlier | None, clocks: bool)
 
 def objects_in(tracking: Sequence[Any], case: Case) -> list[str | None]:
     """Names of all objects of files."""
-    return list(_observations(tracking, case.answers).objects) or [None]
+    return list(observations_of(tracking, case.answers).objects) or [None]
 
 
 def solved(
@@ -270,13 +271,13 @@ def _answered(given: Setup, estimator: Estimator) -> tuple[Array, Array, Estimat
     """Rows that are kept, why the others are not, the answer from these, and what it leaves: edited until nothing changes."""
     keep = np.ones(len(given.rows), dtype=np.bool_)
     reasons = np.full(len(keep), "", dtype=np.object_)
-    first = _analysis_at(given, given.states)
+    first = analysis_at(given, given.states)
     robust = getattr(estimator, "loss", None) is not None  # it weighs rows itself
     if first is not None and not robust:
         keep, reasons = edited(given, first)
     for left in reversed(range(ROUNDS)):
         answer = estimate(given, estimator, keep)
-        analysis = _analysis_at(given, answer.mean) if answer.view == "delayed" else first
+        analysis = analysis_at(given, answer.mean) if answer.view == "delayed" else first
         if analysis is None or robust or answer.view != "delayed":
             return *_gated(answer, keep, reasons), answer, analysis
         again, why = edited(given, analysis, keep)
@@ -296,7 +297,7 @@ def _gated(answer: Estimate, keep: Array, reasons: Array) -> tuple[Array, Array]
     return keep & ~own, reasons
 
 
-def _analysis_at(given: Setup, states: Array) -> Analysis | None:
+def analysis_at(given: Setup, states: Array) -> Analysis | None:
     """None where the states are not finite, or cannot be linearised about."""
     if not np.isfinite(states).all():
         return None
@@ -305,7 +306,8 @@ def _analysis_at(given: Setup, states: Array) -> Analysis | None:
     return found if np.isfinite(found.whitened[there]).all() and np.isfinite(found.rows[there]).all() else None
 
 
-def _observations(tracking: Sequence[Any], told: Mapping[str, Any]) -> Observations:
+def observations_of(tracking: Sequence[Any], told: Mapping[str, Any]) -> Observations:
+    """Measurements of files and objects, put together, with what is told of those of files."""
     if not tracking:
         raise ValueError("there is no tracking: name a file")
     paths = [t for t in tracking if isinstance(t, SOURCES)]
@@ -317,13 +319,21 @@ def _observations(tracking: Sequence[Any], told: Mapping[str, Any]) -> Observati
 
 
 def _of_files(paths: Sequence[Any], told: Mapping[str, Any]) -> Observations:
-    """Measurements of files; `frame` is said of theirs where one of them names no axes, as is told then."""
-    frame = told.get("frame")
-    rows = read_tracking(*paths, **{name: value for name, value in told.items() if name != "frame"})
+    rest = {name: value for name, value in told.items() if name != "frame"}
+    return settled_axes(read_tracking(*paths, **rest), told.get("frame"))
+
+
+def settled_axes(rows: Observations, frame: str | None) -> Observations:
+    """Measurements whose axes are those of ``--frame`` where their file names none, as is told then."""
     if frame is None or not any("--frame" in text for text in rows.open):
         return rows
     named = with_conventions(rows, Conventions.of(frame=frame))
     return replace(named, assumed=(*named.assumed, _OF_ROWS.format(frame)))
+
+
+def answer_axes(given: Setup, frame: str | None) -> str | None:
+    """The axes of the answer that ``--frame`` names, None where it names none, or those of the measurements."""
+    return None if frame is None or _OF_ROWS.format(frame) in given.assumed else frame_named(frame)
 
 
 def _instant(epoch: Any) -> tuple[str | None, Epoch | None]:

@@ -88,6 +88,7 @@ def measured(
     name: str | None = None,
     about: str = "earth",
     antenna: tuple[float, float, float] | None = None,
+    epoch: Epoch | None = None,
 ) -> Measured:
     """Sensors, stations and tracking of observations of one object.
 
@@ -101,6 +102,7 @@ def measured(
     name : of the object, where the files do not say it
     about : what the orbit goes about
     antenna : where fixes are taken, m from the centre of mass along R, T and N
+    epoch : time zero of the tracking; default the second in which the first row is
 
     Raises
     ------
@@ -122,7 +124,7 @@ def measured(
     if not len(index):
         raise ValueError(f"{_where(everything)}there is no measurement to use")
     _check_sigmas(everything, index)
-    epoch = Epoch.at(float(everything.epoch.whole + np.floor(everything.t[index[0]])))
+    epoch = epoch or Epoch.at(float(everything.epoch.whole + np.floor(everything.t[index[0]])))
     known = everything.objects
     own = known[0] if known else name or ""
     context = Context(

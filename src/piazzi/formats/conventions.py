@@ -51,6 +51,7 @@ class Conventions:
     sigmas : standard deviations
     columns : of tables, our names and those of the file
     options : whatever else one format asks for, by name
+    partial : whether they are told of more than what is read, so that a station need not be there
     """
 
     range: str | None = None
@@ -64,6 +65,7 @@ class Conventions:
     sigmas: tuple[Sigma, ...] = ()
     columns: tuple[tuple[str, str], ...] = ()
     options: tuple[tuple[str, Any], ...] = ()
+    partial: bool = False
 
     __repr__ = brief
 
@@ -78,7 +80,7 @@ class Conventions:
         ValueError
             For a word that is none of those, with the nearest.
         """
-        chosen = {name: _word(name, words.pop(name, None)) for name in WORDS}
+        chosen: dict[str, Any] = {name: _word(name, words.pop(name, None)) for name in WORDS}
         frame = words.pop("frame", None)
         if frame is not None and (frame := frame_named(str(frame))) not in KNOWN:
             raise ValueError(f"axes {frame!r} are none of {', '.join(KNOWN)}{suggest(frame, KNOWN)}")
@@ -237,6 +239,8 @@ def _sigmas(observations: Observations, told: Conventions) -> Array:
         rows = missing & observations.of_kind(*rule.kinds)
         if rule.station is not None:
             if rule.station not in observations.participants:
+                if told.partial:
+                    continue
                 raise ValueError(
                     f"sigma for {rule.station!r}: no such station{nearest(rule.station, observations.participants)}"
                 )

@@ -109,8 +109,20 @@ def read_tracking(*paths: str | os.PathLike[str], **conventions: Any) -> Observa
     return with_conventions(concatenate(_tracking(path, told) for path in paths), told)
 
 
+def tracking_of(data: bytes, name: str, **conventions: Any) -> Observations:
+    """Measurements of the text of some of a file, which `name` is in messages; as `read_tracking` otherwise.
+
+    What is told of stations that are not in it is of others.
+    """
+    told = replace(Conventions.of(**conventions), partial=True)
+    return with_conventions(_of_format(data, _format(data, name, bool(told.columns)), name, told), told)
+
+
 def _tracking(path: str | os.PathLike[str], told: Conventions) -> Observations:
-    data, form, name = _opened(path, bool(told.columns))
+    return _of_format(*_opened(path, bool(told.columns)), told)
+
+
+def _of_format(data: bytes, form: Format, name: str, told: Conventions) -> Observations:
     if form.tracking is None:
         from piazzi.formats.fixes import fixes_of
 
@@ -146,6 +158,10 @@ def read_ephemeris(path: str | os.PathLike[str], **conventions: Any) -> Ephemeri
 def _opened(path: str | os.PathLike[str], named: bool = False) -> tuple[bytes, Format, str]:
     """Contents, format and name of a file; where columns are `named`, whatever is of no other format is a table."""
     name, data = os.fspath(path), read_bytes(path)
+    return data, _format(data, name, named), name
+
+
+def _format(data: bytes, name: str, named: bool) -> Format:
     if not data or data.isspace():
         raise ValueError(f"{name}: the file is empty")
     found = recognise(data)
@@ -158,7 +174,7 @@ def _opened(path: str | os.PathLike[str], named: bool = False) -> tuple[bytes, F
         parted = any(mark in data[:HEAD] for mark in b",;\t")
         hint = '; of a table say the columns, as --columns "time=T range=RNG[km]"' if parted else ""
         raise ValueError(f"{name}: line 1: the file is of no format that is known: {', '.join(_names())}{hint}")
-    return data, FORMATS[found], name
+    return FORMATS[found]
 
 
 def _names() -> Iterator[str]:
