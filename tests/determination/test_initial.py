@@ -1,5 +1,7 @@
 """Orbits of a tracking without a guess, by the full model: the truth is among them, and their covariance is honest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -11,6 +13,7 @@ from piazzi.determination.extending import Refined, drift
 from piazzi.determination.sights import rows_of
 from piazzi.orbit import Keplerian
 from piazzi.orbit.fits import DIRECTION, RANGE
+from piazzi.scenarios import load_scenario
 from tests.determination.fixing import EPOCH, STATE, observations, truth
 
 T = np.arange(0.0, 43200.0, 900.0)
@@ -42,6 +45,29 @@ def test_what_no_sensor_can_tell_is_said():
     )
     with pytest.raises(ValueError, match="measures distances, their rates, directions or positions"):
         pz.initial_orbits(problem, pz.Tracking([0.0, 60.0], [[7e6], [7e6]], epoch=EPOCH))
+
+
+def test_a_graph_begins_at_the_orbits_that_fit():
+    """The prior is on the far side of the Earth and as wide as the orbit: the graph comes to the truth, in one mode."""
+    path = truth(T)
+    noisy = path[:, :3] + 5.0 * np.random.default_rng(1).standard_normal((len(T), 3))
+    solved = pz.determine(observations(noisy, T, 5.0))
+    wide = pz.Gaussian(-STATE, np.diag([3e7**2] * 3 + [5e3**2] * 3))
+    problem = replace(solved.problem, prior=wide)
+    found = pz.FactorGraph(start="orbits").estimate(problem, solved.tracking)
+    assert found.success, found.message
+    assert found.details["start"] == "orbits" and len(found.details["modes"]) == 1
+    off = found.mean[0, :6] - STATE
+    assert off @ np.linalg.solve(found.covariance[0, :6, :6], off) < 30.0
+    by_words = pz.determine(observations(noisy, T, 5.0), with_="graph:orbits")
+    assert_allclose(by_words.orbit.at(), solved.orbit.at(), rtol=1e-9)
+
+
+def test_a_graph_of_other_states_has_no_orbits_to_begin_at():
+    problem = load_scenario("b612-range").problem
+    tracking = pz.simulate(problem, [0.0, 0.1], np.random.default_rng(0))
+    with pytest.raises(ValueError, match="initial orbits need a problem with states x, y, z, vx, vy, vz"):
+        pz.FactorGraph(start="orbits").estimate(problem, tracking)
 
 
 def test_the_sigma_of_the_mean_motion_is_by_its_derivative():

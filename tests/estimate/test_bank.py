@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
+from piazzi.estimate.bank import Paths
 from tests.laws.graphs import LinearCase
 from tests.laws.problems import assert_same_estimate, b612
 
@@ -34,6 +35,17 @@ def test_twins_are_found_and_equally_probable():
     distance = [np.abs(states - tracking.truth).max() for states in (a, b)]
     assert min(distance) < 1.0
     assert max(distance) > 10.0
+
+
+def test_given_paths_are_weighed_as_members_are():
+    """From near each twin: both are found, and the details are those of a bank."""
+    problem, tracking = mirrored()
+    bank = pz.FactorGraph(start="bank").estimate(problem, tracking)
+    a, b = bank.details["mode_states"]
+    found = pz.FactorGraph(start=Paths((b + 0.01, a + 0.01))).estimate(problem, tracking)
+    assert found.success, found.message
+    assert [mode["probability"] for mode in found.details["modes"]] == pytest.approx([0.5, 0.5], abs=1e-4)
+    assert_allclose(np.sort(found.details["mode_states"][:, 0], axis=0), np.sort(np.stack([a, b])[:, 0], axis=0), atol=1e-4)
 
 
 def test_a_prior_that_leans_one_way_makes_that_twin_the_more_probable_one():

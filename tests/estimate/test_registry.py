@@ -29,6 +29,7 @@ from piazzi.estimate.registry import ESTIMATORS, parse
         ("graph:ekf:cauchy", pz.FactorGraph(start="ekf", loss=pz.Cauchy(2.385))),
         ("graph:tukey=6:window", pz.FactorGraph(start="window", loss=pz.Tukey(6.0))),
         ("graph:bank", pz.FactorGraph(start="bank")),
+        ("graph:orbits:huber", pz.FactorGraph(start="orbits", loss=pz.Huber(1.345))),
         ("graph:bank=64:huber", pz.FactorGraph(start=pz.Bank(64), loss=pz.Huber())),
         ("window:100:tukey", pz.SlidingWindow(loss=pz.Tukey(4.685))),
         ("window:20x2:huber=2", pz.SlidingWindow(20, 2, loss=pz.Huber(2.0))),

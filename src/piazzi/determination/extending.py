@@ -78,6 +78,12 @@ def refined(
     return found, keep, beyond
 
 
+def part(tracking: Tracking, keep: Array) -> Tracking:
+    """The rows to keep (J,) alone."""
+    who = tracking.row_stations
+    return Tracking(tracking.row_times[keep], tracking.values[keep], None if who is None else who[keep], epoch=tracking.epoch)
+
+
 def drift(one: Refined, mu: float) -> float:
     """Sigma of the mean motion, rad/s."""
     r, v = one.state[:3], one.state[3:]
@@ -127,7 +133,7 @@ def _carried(problem: Problem, found: Sequence[Refined], first: float, centre: C
 def _fits(problem: Problem, tracking: Tracking, keep: Array, starts: Sequence[Array], graph: bool = True) -> Iterator[Refined]:
     """Fits to the rows to keep (J,), from states (n,) at the first of them; by a graph too where batch least squares fails."""
     times = tracking.row_times[keep]
-    few = Tracking(times, tracking.values[keep], tracking.row_stations[keep], epoch=tracking.epoch)
+    few = part(tracking, keep)
     for start in starts:
         sigma = WIDE * np.repeat([np.linalg.norm(start[:3]), np.linalg.norm(start[3:6])], 3)
         posed = replace(problem, prior=Gaussian(start[:6], np.diag(sigma**2)), prior_time=float(times.min()))

@@ -6,9 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from piazzi.determination.beliefs import carried_to
 from piazzi.determination.centres import Centre, centre_of
-from piazzi.determination.extending import LONGER, refined, weighed
-from piazzi.determination.initial_result import InitialOrbits, OrbitMode, Parting
+from piazzi.determination.extending import LONGER, part, refined, weighed
+from piazzi.determination.initial_result import InitialOrbits, OrbitMode, Parting, UndeterminedError
+from piazzi.determination.orbit_forces import STEPS
 from piazzi.determination.ridge import OPEN, openness, ridge
 from piazzi.determination.sights import observers, rows_of
 from piazzi.orbit import propagate_kepler
@@ -63,12 +65,38 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None =
     return InitialOrbits(modes, search.starts, search.fits, apart, centre.name, None, beyond)
 
 
+def orbit_paths(problem: Problem, tracking: Tracking) -> list[Array]:
+    """States (K, n) at all times of a tracking, of every orbit that fits, the most probable first.
+
+    Raises
+    ------
+    UndeterminedError
+        Where the measurements leave a ridge.
+    ValueError
+        As `initial_orbits` does.
+    """
+    found = initial_orbits(problem, tracking)
+    if not found.modes:
+        raise UndeterminedError(found)
+    return [_path(problem, mode, tracking.times, centre_of(found.about)) for mode in found.modes]
+
+
+def _path(problem: Problem, mode: OrbitMode, t: Array, centre: Centre) -> Array:
+    """States (K, n) of an orbit at times, by the forces of the problem."""
+    x, begin = np.concatenate([mode.mean, problem.mean[6:]]), mode.epoch - problem.epoch
+    out, nothing = np.tile(x, (len(t), 1)), np.zeros((len(x), len(x)))
+    for side in (t > begin, t < begin):
+        if side.any():
+            step = centre.longest_step(mode.mean[:3], mode.mean[3:], STEPS)
+            out[side] = carried_to(problem, step, begin, x, nothing, t[side])[0]
+    return out
+
+
 def _around(tracking: Tracking, length: float) -> Tracking:
     """The rows of the first stretch, and those that are near it."""
     times = tracking.row_times
     own = times[first_stretch(times, length, WIDEST * length)]
-    keep = (times >= own.min() - WIDEST * length) & (times <= own.max() + WIDEST * length)
-    return Tracking(times[keep], tracking.values[keep], tracking.row_stations[keep], epoch=tracking.epoch)
+    return part(tracking, (times >= own.min() - WIDEST * length) & (times <= own.max() + WIDEST * length))
 
 
 def _looked(rows: Rows, length: float, region: Region) -> tuple[Array, Search]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Any
@@ -63,6 +64,23 @@ class Bank:
         away = np.stack([side, -side], axis=1).reshape(-1, n)[: self.members - 1]
         return np.vstack([problem.mean, problem.mean + away @ root(problem.covariance).T])
 
+    def starts(self, chain: Chain, inputs: Inputs) -> Iterator[Array]:
+        """States at all nodes of the chain, of each member."""
+        for point in self.points(chain.problem):
+            yield member_start(self, chain, inputs, point)
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """Starts that are whole paths: states (K, n) at the epochs of a tracking; the graph itself begins at the first."""
+
+    states: tuple[Array, ...]
+
+    def starts(self, chain: Chain, inputs: Inputs) -> Iterator[Array]:
+        """States at all nodes of the chain, of the other paths."""
+        for path in self.states[1:]:
+            yield with_first(chain, path)
+
 
 @dataclass(frozen=True, eq=False)
 class Mode:
@@ -116,15 +134,20 @@ def with_prior(problem: Problem, mean: Array, covariance: Array) -> Problem:
     return other
 
 
-def search(bank: Bank, chain: Chain, solver: Solver, inputs: Inputs, first: Outcome, tolerance: float) -> Outcome:
+def with_first(chain: Chain, states: Array) -> Array:
+    """States at all nodes of the chain: before those of the epochs, the prior mean where the chain begins earlier."""
+    before = chain.inputs.epochs - len(states)
+    return np.vstack([chain.problem.mean] * before + [states]) if before else states
+
+
+def search(bank: Bank | Paths, chain: Chain, solver: Solver, inputs: Inputs, first: Outcome, tolerance: float) -> Outcome:
     """The most probable solution among `first`, at which the chain stands, and those of the bank; the chain is left there."""
     modes: list[Mode] = []
     iterations, states_first = first.iterations, chain.x.copy()
     if not first.failure:
         modes = merged(modes, found(chain, first, usual=True))
     # where the prior is too wide for the solver, no member does better
-    for point in bank.points(chain.problem) if not first.failure.startswith(TOO_WIDE) else ():
-        states = member_start(bank, chain, inputs, point)
+    for states in bank.starts(chain, inputs) if not first.failure.startswith(TOO_WIDE) else ():
         if not np.isfinite(states).all():
             continue
         outcome = minimize(chain, solver, states, STEPS, tolerance, direct=True)

@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from piazzi.estimate.bank import Bank, search
+from piazzi.drawn import later
+from piazzi.estimate.bank import Bank, Paths, search, with_first
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
 from piazzi.estimate.considered import nominal, with_considered
@@ -25,7 +26,7 @@ from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.inputs import Inputs, prepare, with_prior_node
 
-STARTS = ("ekf", "prior", "window", "bank")
+STARTS = ("ekf", "prior", "window", "bank", "orbits")
 CONSTANTS = ("joint", "marginal")
 SOLVERS = ("auto", "chain", "bordered")
 # iterations that a second solution may take before the first is kept
@@ -38,9 +39,10 @@ class FactorGraph:
 
     Parameters
     ----------
-    start : "ekf", "prior", "window", "bank", a `Bank`, or states (K, n)
+    start : "ekf", "prior", "window", "bank", "orbits", a `Bank`, or states (K, n)
         Where the iterations begin.  A bank begins in many places of the prior too, and takes the most probable of the
-        solutions that it finds; see `Bank`.
+        solutions that it finds; see `Bank`.  "orbits" begins at every orbit that `initial_orbits` finds in the tracking, which
+        needs no prior that knows where the body is, and lists and weighs the solutions as a bank does.
     max_iterations : int
         From each start; with a loss four times as many, because reweighting converges linearly.
     tolerance : float
@@ -107,8 +109,14 @@ class FactorGraph:
         Raises
         ------
         ValueError
-            Where the tracking does not fit the problem, or the start has the wrong shape.
+            Where the tracking does not fit the problem, or the start has the wrong shape; of orbits where none fits.
         """
+        if isinstance(self.start, str) and self.start == "orbits":
+            paths = later("determination.initial", "orbit_paths")(problem, tracking)
+            return replace(self, start=Paths(tuple(paths)))._estimated(problem, tracking)
+        return self._estimated(problem, tracking)
+
+    def _estimated(self, problem: Problem, tracking: Tracking) -> Estimate:
         inputs = prepare(problem, tracking)
         nodes = with_prior_node(inputs)
         skip = nodes.epochs - inputs.epochs
@@ -150,10 +158,10 @@ class FactorGraph:
         return replace(outcome, details=outcome.details | {"remark": said}) if said else outcome
 
     @property
-    def _bank(self) -> Bank | None:
+    def _bank(self) -> Bank | Paths | None:
         if isinstance(self.start, str):
             return Bank() if self.start == "bank" else None
-        return self.start if isinstance(self.start, Bank) else None
+        return self.start if isinstance(self.start, (Bank, Paths)) else None
 
     def _optimize(self, chain: Chain, inputs: Inputs, tracking: Tracking) -> tuple[Outcome, Solver, str]:
         """Optimise from the start asked for; the outcome, its solver, and the starts used.
@@ -163,7 +171,7 @@ class FactorGraph:
         the prior too: it may have led to another solution of the same measurements.
         """
         problem, name = chain.problem, self.start if isinstance(self.start, str) else "given"
-        name = name if self._bank is None else "ekf"
+        name = name if self._bank is None or isinstance(self.start, Paths) else "ekf"
         applies = BorderedSolver.applies(problem)
         if self.solver == "bordered" and not applies:
             raise ValueError(f"solver 'bordered' cannot be used: {NOT_BORDERED}")
@@ -193,6 +201,7 @@ class FactorGraph:
                 solver, wide, tried = solver if bordered else BorderedSolver(chain), True, []
                 waiting = [*(["given"] if name == "given" else []), "prior", "window"]
         outcome, used = _together(tried), ", then ".join(start for start, _ in tried)
+        used = used.replace("given", "orbits") if isinstance(self.start, Paths) else used
         for start in self._others(chain, doubtful, tried[-1][0]) if not outcome.failure else ():
             states, _ = self._begin(start, chain.problem, tracking, inputs)
             outcome, better = self._or_better(chain, solver, outcome, with_first(chain, states))
@@ -222,7 +231,7 @@ class FactorGraph:
         """States to start from, (K, n), and whether the filter that they come from was wrong about its errors."""
         K, n = len(tracking.times), problem.model.n
         if start == "given":
-            states = numeric(self.start, "start")
+            states = numeric(self.start.states[0] if isinstance(self.start, Paths) else self.start, "start")
             if states.shape != (K, n) or not np.isfinite(states).all():
                 raise ValueError(f"start has shape {states.shape}; it must be ({K}, {n}), and finite")
             return states, False
@@ -258,9 +267,3 @@ def _too_wide(outcome: Outcome, solver: str) -> Outcome:
     """The outcome for a prior too wide for covariances where they must be used."""
     way = "choose solver='auto'" if solver == "chain" else NOT_BORDERED
     return replace(outcome, failure=f"{TOO_WIDE} beside the noise of the measurements: {way}")
-
-
-def with_first(chain: Chain, states: Array) -> Array:
-    """States at all nodes of the chain: before those of the epochs, the prior mean where the chain begins earlier."""
-    before = chain.inputs.epochs - len(states)
-    return np.vstack([chain.problem.mean] * before + [states]) if before else states

@@ -35,7 +35,8 @@ def ended_exactly(start_of: Callable[[Estimate], Array]) -> Callable[[Run[_Estim
             if not near.success:
                 return replace(run(self, exact, tracking), problem=problem)
             found = run(replace(given, start=start_of(near)), exact, tracking)
-            details = {**found.details, "start": near.details["start"], "approximate_iterations": near.iterations}
+            modes = {key: near.details[key] for key in ("modes", "mode_states") if key in near.details}
+            details = {**modes, **found.details, "start": near.details["start"], "approximate_iterations": near.iterations}
             iterations, seconds = near.iterations + found.iterations, near.seconds + found.seconds
             return replace(found, problem=problem, iterations=iterations, seconds=seconds, details=details)
 

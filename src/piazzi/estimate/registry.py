@@ -159,7 +159,7 @@ ESTIMATORS: Mapping[str, Entry] = {
         _plain,
     ),
     "graph": Entry(
-        "graph[:ekf|:prior|:window|:bank[=N]][:LOSS[=K]]",
+        "graph[:ekf|:prior|:window|:bank[=N]|:orbits][:LOSS[=K]]",
         "factor graph over all states, started from one of these; a LOSS (huber, cauchy, tukey) withstands outliers",
         "piazzi.estimate.factor_graph:FactorGraph",
         _graph,
