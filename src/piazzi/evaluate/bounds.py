@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
-from piazzi.estimate.factor_graph import with_first
+from piazzi.estimate.bank import with_first
 from piazzi.estimate.width import DIFFUSE
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
