@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from piazzi.estimate.bank import with_first
 from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
-from piazzi.estimate.bank import with_first
 from piazzi.estimate.width import DIFFUSE
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
