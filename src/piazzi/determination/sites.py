@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.earth import Epoch, Station, StationList, Weather, ilrs_stations, read_stations
+from piazzi.earth import Epoch, Station, StationList, Weather, ilrs_stations, mpc_stations, read_stations
 from piazzi.formats import Observations
 from piazzi.problem.checks import Array
 from piazzi.text import nearest
 
-OWN = ("ilrs",)  # lists of stations that the package has
+OWN = {"ilrs": ilrs_stations, "mpc": mpc_stations}  # lists of stations that have a name
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class Context:
 def station_named(name: str, sites: StationList | None, where: str = "") -> Station:
     """The station of a list; raises ValueError with how to give it."""
     if sites is None:
-        raise ValueError(f"{where}where is station {name}? Give it with --stations FILE (TOML or SINEX), or ilrs")
+        raise ValueError(f"{where}where is station {name}? Give it with --stations FILE (TOML or SINEX), ilrs or mpc")
     found = _matched(name, sites)
     if found is None:
         raise ValueError(f"{where}no station {name} in --stations{nearest(name, list(sites)[:2000])}")
@@ -81,7 +81,7 @@ def _matched(name: str, sites: StationList) -> Station | None:
 
 
 def sites_of(given: Any) -> StationList | None:
-    """The stations that a user gives: files, ``ilrs``, stations, lists of them; None for none."""
+    """The stations that a user gives: files, ``ilrs``, ``mpc``, stations, lists of them; None for none."""
     if given is None or (isinstance(given, (list, tuple)) and not given):
         return None
     if isinstance(given, StationList):
@@ -94,10 +94,8 @@ def sites_of(given: Any) -> StationList | None:
             found.append(item)
         elif isinstance(item, StationList):
             found += item.stations
-        elif item in OWN:
-            found += ilrs_stations().stations
-        elif item == "mpc":
-            raise ValueError("--stations mpc: the list of observatory codes is no part of the package: name its file")
+        elif isinstance(item, str) and item in OWN:
+            found += OWN[item]().stations
         else:
             files.append(item)
     if files:

@@ -13,6 +13,7 @@ from piazzi.earth.formula import Formula
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
 from piazzi.earth.gravity import Gravity
 from piazzi.earth.ilrs import ilrs_stations
+from piazzi.earth.observatories import mpc_stations
 from piazzi.earth.rotation import FRAMES, rotation, rotation_rate, transform
 from piazzi.earth.satellites import LASER_SPHERES, LaserSphere, laser_sphere
 from piazzi.earth.space_weather import SpaceWeather, SpaceWeatherWarning, read_space_weather
@@ -36,8 +37,7 @@ __all__ = [
     "EphemerisWarning", "Epoch", "ForceChoice", "Forces", "Formula", "Gravity", "GravityField", "LaserSphere", "Place",
     "Rotation", "SpaceWeather", "SpaceWeatherWarning", "Station", "StationList", "StationWarning", "Thermosphere", "Weather",
     "azimuth_elevation_range", "body", "coefficient_faults", "default_forces", "geodetic_to_position",
-    "gravity_field", "ilrs_stations",
-    "laser_sphere", "media", "pole_tide",
+    "gravity_field", "ilrs_stations", "laser_sphere", "media", "mpc_stations", "pole_tide",
     "position_to_geodetic", "read_eop", "read_forces", "read_gravity", "read_space_weather", "read_stations", "rotation",
     "rotation_rate", "sensors", "solid_tide", "station_displacement", "transform", "up_north_east", "use_data",
 ]  # fmt: skip

@@ -14,6 +14,7 @@ from piazzi.earth.eop import GROUND_SPEED, mjd_text, tables
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import read_gravity
 from piazzi.earth.ilrs import SOURCE
+from piazzi.earth.observatories import mpc_date
 from piazzi.earth.space_weather import read_space_weather
 from piazzi.earth.station_files import read_stations
 
@@ -21,6 +22,7 @@ EOP_ADDRESS = "https://datacenter.iers.org/data/9/finals2000A.all"
 WEATHER_ADDRESS = "https://celestrak.org/SpaceData/SW-All.csv"
 KERNEL_ADDRESS = "https://naif.jpl.nasa.gov/pub/naif/generic_kernels/spk/planets/de440s.bsp"
 LEAP_ADDRESS = "https://hpiers.obspm.fr/iers/bul/bulc/Leap_Second.dat"
+MPC_ADDRESS = "https://www.minorplanetcenter.net/iau/lists/ObsCodes.html"
 STATIONS_ADDRESS = "https://cddis.nasa.gov/archive/slr/products/resource/"
 FIELD_ADDRESS = "https://icgem.gfz.de"
 ADDRESSES = {"eop": EOP_ADDRESS, "weather": WEATHER_ADDRESS, "kernel": KERNEL_ADDRESS}
@@ -131,6 +133,10 @@ def _stations() -> list[Entry]:
     entries = [
         Entry("stations", f"package: ILRS sites, {SOURCE}", "2020-04-28", "", "later sites are not in it", STATIONS_ADDRESS)
     ]
+    if (dated := mpc_date()) is not None:
+        entries.append(
+            Entry("stations", "package: observatory codes of the MPC", dated, "", "later codes are not in it", MPC_ADDRESS)
+        )
     for path in finding.found("stations"):
         try:
             count = f"{len(read_stations(path))} stations"

@@ -43,8 +43,8 @@ def read_stations(*paths: str | Path) -> StationList:
     """Stations of files, which are told apart by content.
 
     Takes TOML (``[[stations]]``), SINEX with coordinates and velocities, SINEX with eccentricities only, which are given to
-    the stations of the other files, and the list of observatory codes of the Minor Planet Center.  Sites of a SINEX file for
-    which no file has eccentricities get those of the list of the ILRS in the package, which `notes` says.
+    the stations of the other files, and the list of observatory codes of the Minor Planet Center, text or JSON.  Sites of a
+    SINEX file for which no file has eccentricities get those of the list of the ILRS in the package, which `notes` says.
 
     Raises ValueError with the file and the place where a value cannot be read, and OSError where a file cannot be opened.
     Warns with StationWarning where a station stands inside the Earth, in space, or where latitude and longitude, or metres
@@ -62,7 +62,7 @@ def read_stations(*paths: str | Path) -> StationList:
             surveys += stations_of(sinex, path.name)
             for site, rows in sinex.eccentricities.items():
                 offsets.setdefault(site, []).extend(rows)
-        elif re.search(rb"(?m)^\w\d\d [ \d]{2}\d\.\d{4}", start):
+        elif start.lstrip().startswith(b"{") or re.search(rb"(?m)^\w\d\d [ \d]{2}\d\.\d{4}", start):
             found += read_observatories(path, notes)
         else:
             found += _toml(path)
