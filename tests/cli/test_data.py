@@ -60,7 +60,15 @@ def test_the_table_and_its_json(call, tmp_path):
     document = call("data", "--json").document
     assert document["schema"] == "piazzi.data/1"
     assert document["folders"] == [str(tmp_path / "earth"), str(tmp_path / "share" / "piazzi")]
-    assert [e["kind"] for e in document["data"]] == ["eop", "leap seconds", "weather", "kernel", "stations", "stations", "field"]  # of the ILRS and the MPC
+    assert [e["kind"] for e in document["data"]] == [
+        "eop",
+        "leap seconds",
+        "weather",
+        "kernel",
+        "stations",
+        "stations",
+        "field",
+    ]  # of the ILRS and the MPC
     assert set(document["data"][0]) == {"kind", "file", "last", "predicted", "cost", "address"}
 
 
