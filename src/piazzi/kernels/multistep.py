@@ -79,7 +79,7 @@ def _lagrange(j: int, count: int) -> Weights:
 
 def second_order(model: Model) -> tuple[tuple[int, int], ...]:
     """Pairs of a state whose rate is a state, and that state, by position; () unless every other state is constant."""
-    if model.discrete or model.memory or model.events:
+    if model.discrete or model.memory:
         return ()
     place = {name: i for i, name in enumerate(model.states)}
     rates = [text.strip() for text in model.dynamics]
@@ -105,6 +105,8 @@ def multistep_source(model: Model, order: int) -> str:
     return (
         "".join(f"{name} = {size}\n" for name, size in sizes.items())
         + "\n\n"
+        + inline_source("rate(t, x, p)", "return dynamics(t, x, p)")
+        + inline_source("rate_jacobian(t, x, R, p)", "return rhs(t, x, R, p)")
         + inline_source("predicted(F, at)", *_sums([[repr(w) for w in row] for row in literal[0]]))
         + inline_source("corrected(F, at)", *_sums([[repr(w) for w in row] for row in literal[1]]))
         + inline_source("between(F, at, s)", *horner, "a = (s * s) * a", "b = s * b", *_sums(entries))

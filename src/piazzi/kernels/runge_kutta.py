@@ -176,7 +176,7 @@ class GaussJackson(RungeKutta8):
     -----
     For models whose states come in pairs, the rate of one being the other, with constants beside them; arcs of other models,
     arcs of less than 30 steps, and those for which order 8 needs fewer evaluations go by order 8.  The first steps are of
-    order 8; a manoeuvre begins anew.  Epochs within a step are found with the order of the method.
+    order 8; a manoeuvre or an event begins anew.  Epochs within a step are found with the order of the method.
     """
 
     order: int = field(default=10, kw_only=True)

@@ -124,6 +124,7 @@ propagate_noise: Any
 begin: Any
 side_of: Any
 lowest: Any
+is_clear: Any
 crossing: Any
 cross: Any
 arrive: Any
@@ -183,6 +184,8 @@ width_of_row: Any
 record_belief: Any
 # written in fragments/gauss_jackson_*.py
 first_derivative: Any
+rate: Any
+rate_jacobian: Any
 rates_of: Any
 stepped: Any
 rows_at: Any
@@ -193,3 +196,8 @@ doubled_rows: Any
 joined_rows: Any
 begin_derivatives: Any
 write_derivative: Any
+write_last: Any
+# written in fragments/arc_*watched.py
+watching: Any
+watch_from: Any
+may_pass: Any

@@ -57,33 +57,49 @@ class Arc(NamedTuple):
 
 def arc(problem: Moving, times: Array, first: Array, steps: Steps, derivative: bool) -> Arc:
     """The states at increasing times (K,) of the orbit from `first` (n,), which is the state at the first of them."""
-    K, n = len(times), problem.model.n
     problem.cover(float(times[0]), float(times[-1]))
-    out = Arc(np.empty((K, n)), np.empty((K - 1, n, n) if derivative else (0, n, n)))
-    out.x[0] = first
+    way = _Way(times, first, derivative)
     if steps.grid is None:
-        _by_intervals(problem, times, out, steps, events=True)
-        return out
-    last, node, now = 0, float(times[0]), out.x[0]  # the last epoch; where a smooth stretch begins, with the state there
-    before = np.eye(n)  # the derivative of that state by the one at the last epoch
-    for when, jump in [*_jumps(problem, times), (np.inf, np.zeros(n))]:
+        _by_intervals(problem, times, way.out, steps, events=True)
+        return way.out
+    for when, jump in [*_jumps(problem, times), (np.inf, np.zeros(len(first)))]:
         slack = SAME * max(abs(when), 1.0) if np.isfinite(when) else 0.0
         stop = int(np.searchsorted(times, when + slack, "right"))
-        inner = times[last + 1 : stop]
-        on_epoch = stop == K if not np.isfinite(when) else bool(len(inner)) and inner[-1] >= when - slack
-        nodes = np.concatenate([[node], inner, [] if on_epoch else [when]])
-        stretch = _smooth(problem, nodes, now, steps, derivative)
-        inside = len(inner)
-        out.x[last + 1 : stop] = stretch.x[1 : inside + 1]
-        now = stretch.x[-1] + jump
-        if derivative and len(nodes) > 1:
-            stretch.Phi[0] = stretch.Phi[0] @ before
-            out.Phi[last : stop - 1] = stretch.Phi[:inside]
-            before = np.eye(n) if on_epoch else stretch.Phi[-1]
+        inner = times[way.last + 1 : stop]
+        on_epoch = stop == len(times) if not np.isfinite(when) else bool(len(inner)) and inner[-1] >= when - slack
+        nodes = np.concatenate([[way.node], inner, [] if on_epoch else [when]])
+        way.go(_smooth(problem, nodes, way.now, steps, derivative), len(inner), float(nodes[-1]))
+        way.now = way.now + jump
         if on_epoch:
-            out.x[stop - 1] = now
-        last, node = stop - 1, float(nodes[-1])
-    return out
+            way.out.x[stop - 1] = way.now
+    return way.out
+
+
+class _Way:
+    """An arc that is put together of stretches, which may end between its epochs.
+
+    Attributes
+    ----------
+    out : what is known of it
+    last : the last epoch that was reached
+    node, now, before : where the next stretch begins, the state there, and its derivative by that of the last epoch
+    """
+
+    def __init__(self, times: Array, first: Array, derivative: bool) -> None:
+        K, n = len(times), len(first)
+        self.out = Arc(np.empty((K, n)), np.empty((K - 1, n, n) if derivative else (0, n, n)))
+        self.out.x[0] = first
+        self.last, self.node, self.now, self.before = 0, float(times[0]), self.out.x[0], np.eye(n)
+
+    def go(self, stretch: Arc, inside: int, node: float) -> None:
+        """Add a stretch whose nodes behind its first are `inside` epochs, and one more if it does not end at an epoch."""
+        first, stop = self.last, self.last + inside
+        self.out.x[first + 1 : stop + 1] = stretch.x[1 : inside + 1]
+        if len(stretch.Phi):
+            stretch.Phi[0] = stretch.Phi[0] @ self.before
+            self.out.Phi[first:stop] = stretch.Phi[:inside]
+            self.before = np.eye(len(self.now)) if inside == len(stretch.Phi) else stretch.Phi[-1]
+        self.last, self.node, self.now = stop, node, stretch.x[-1]
 
 
 def _jumps(problem: Moving, times: Array) -> list[tuple[float, Array]]:
@@ -99,21 +115,55 @@ def _jumps(problem: Moving, times: Array) -> list[tuple[float, Array]]:
 
 
 def _smooth(problem: Moving, nodes: Array, first: Array, steps: Steps, derivative: bool) -> Arc:
-    """A stretch without manoeuvres, on a grid of its own that ends where it does."""
-    n, K = problem.model.n, len(nodes)
+    """A stretch without manoeuvres, on a grid of its own that ends where it does.
+
+    Before a step in which an event may be passed the grid ends too; that step is one of order 8, and another grid begins
+    behind it.  Where that comes more often than every `FEWEST` steps, the rest goes by order 8.
+    """
+    way, taken, ends = _Way(nodes, first, derivative), 0, 0
+    while way.last < len(nodes) - 1:
+        at = np.concatenate([[way.node], nodes[way.last + 1 :]])
+        count = grid_steps(at[-1] - at[0], steps)
+        if count < FEWEST or (ends > 1 and taken < FEWEST * ends):
+            way.go(_stepped(problem, at, way.now, steps, derivative), len(at) - 1, float(at[-1]))
+            break
+        done, inside, node, part = _on_grid(problem, at, way.now, count, derivative)
+        way.go(part, inside, node)
+        if done == count:
+            break
+        taken, ends = taken + done, ends + 1
+        end = float(at[-1] if done + 1 == count else at[0] + (done + 1) * ((at[-1] - at[0]) / count))
+        inner = nodes[way.last + 1 : int(np.searchsorted(nodes, end, "right"))]
+        beyond = [] if len(inner) and inner[-1] == end else [end]
+        step = np.concatenate([[node], inner, beyond])
+        way.go(_stepped(problem, step, way.now, steps, derivative), len(inner), end)
+    return way.out
+
+
+def _on_grid(problem: Moving, at: Array, first: Array, count: int, derivative: bool) -> tuple[int, int, float, Arc]:
+    """So many equal steps of the multi-step method, or those before an event: how many, and how many epochs, until when."""
+    n, K = len(first), len(at)
+    out, last, last_Phi = Arc(np.empty((K, n)), np.empty((K - 1, n, n) if derivative else (0, n, n))), first.copy(), np.eye(n)
+    out.x[0] = first
+    assert problem.integrator is not None
+    watched = ("events", "arc_watched") if problem.model.events else ("arc_unwatched",)
+    fragments = ("matrices", *watched, f"gauss_jackson_{'rows' if derivative else 'state'}", "gauss_jackson")
+    library = kernels.load(_spec(problem, problem.integrator.arc_scheme, fragments))
+    done = np.array([count, K - 1, at[-1]])
+    library.run_multistep(K, at, count, problem.given_bundle, out.x, out.Phi, done, last, last_Phi)
+    inside = int(done[1])
+    if int(done[0]) < count:
+        Phi = np.concatenate([out.Phi[:inside], last_Phi[None]]) if derivative else out.Phi
+        out = Arc(np.vstack([out.x[: inside + 1], last]), Phi)
+    return int(done[0]), inside, float(done[2]), out
+
+
+def _stepped(problem: Moving, at: Array, first: Array, steps: Steps, derivative: bool) -> Arc:
+    """A stretch without manoeuvres by one-step methods."""
+    n, K = len(first), len(at)
     out = Arc(np.empty((K, n)), np.empty((K - 1, n, n) if derivative else (0, n, n)))
     out.x[0] = first
-    if K < 2:
-        return out
-    count = grid_steps(nodes[-1] - nodes[0], steps)
-    if count < FEWEST:
-        _by_intervals(problem, nodes, out, steps, events=False)
-        return out
-    assert problem.integrator is not None
-    scheme = problem.integrator.arc_scheme
-    kind = "rows" if derivative else "state"
-    library = kernels.load(_spec(problem, scheme, ("matrices", f"gauss_jackson_{kind}", "gauss_jackson")))
-    library.run_multistep(K, nodes, count, problem.given_bundle, out.x, out.Phi)
+    _by_intervals(problem, at, out, steps, events=False)
     return out
 
 

@@ -65,32 +65,12 @@ def propagate_arc_jacobian(t, dt, count, x, R, p):
     return x, R
 
 
-@outlined
-def is_clear(start, end, sides, clock):
-    """1 where in no lane an event can lie between both ends of a step, by the first look of `passes`; else 0."""
-    clear = 1
-    for lane in range(LANES):
-        t, h = clock[lane], clock[LANES + lane]
-        slack = 1e-12 * maximum(fabs(t + h), 1.0) / fabs(h)
-        for e in range(EVENTS):
-            i, rate = e * LANES + lane, (EVENTS + e) * LANES + lane
-            a, b = sides[i] * start[i], sides[i] * h * start[rate]
-            c, d = sides[i] * end[i], sides[i] * h * end[rate]
-            if not c > slack * fabs(d):
-                clear = 0
-            elif b < 0.0 < d:
-                _, least = lowest(a, b, c, d)
-                if not least > minimum(a, c) - least:
-                    clear = 0
-    return clear
-
-
 @inline
 def is_clear_at(t, h, y, own, sides, end, clock):
     """The same of a step from what is at the start, `own.work`, to the states `y`, which the next one starts from."""
     store_packs(end, 0, events_of(t + h, y, own), LANES)
     store_packs(clock, 0, vector(t + 0.0 * y[0], h + 0.0 * y[0]), LANES)
-    clear = is_clear(own.work, end, sides, clock)
+    clear = is_clear(own.work, end, 0, sides, clock)
     for i in range(EVENTS_LANES):
         own.work[i] = end[i]
     return clear

@@ -78,6 +78,29 @@ def passes(e, t, h, x, p):
 
 
 @outlined
+def is_clear(start, end, at, sides, clock):
+    """1 where in no lane an event can lie between both ends of a step, by the first look of `passes`; else 0.
+
+    Values and rates at the end lie in `end` from `at`; `clock` has the times at which the step begins, and its lengths.
+    """
+    clear = 1
+    for lane in range(LANES):
+        t, h = clock[lane], clock[LANES + lane]
+        slack = 1e-12 * maximum(fabs(t + h), 1.0) / fabs(h)
+        for e in range(EVENTS):
+            i, rate = e * LANES + lane, (EVENTS + e) * LANES + lane
+            a, b = sides[i] * start[i], sides[i] * h * start[rate]
+            c, d = sides[i] * end[at + i], sides[i] * h * end[at + rate]
+            if not c > slack * fabs(d):
+                clear = 0
+            elif b < 0.0 < d:
+                _, least = lowest(a, b, c, d)
+                if not least > minimum(a, c) - least:
+                    clear = 0
+    return clear
+
+
+@outlined
 def located(e, t, h, x, p, high):
     """The fraction of the step at which the orbit passes event e, before the one at which it is beyond: by Newton's method."""
     side, last = p.sides[e], (2 if high == 1.0 else 4) * EVENTS + e

@@ -22,26 +22,36 @@ def rates_at(F, at):
 
 
 @entry
-@sizes(K="K", t="K", x="K N", Phi="* N N")
-def run_multistep(K: int, t: Array, steps: int, p: Given, x: Array, Phi: Array) -> None:
-    F, kept = scratch(HISTORY), scratch(NN)
+@sizes(K="K", t="K", x="K N", Phi="* N N", done="3", last="N", last_Phi="N N")
+def run_multistep(
+    K: int, t: Array, steps: int, p: Given, x: Array, Phi: Array, done: Array, last: Array, last_Phi: Array
+) -> None:
+    """Of a model with events up to the step in which one may be passed: steps and epochs that are `done`, and until when."""
+    F, kept, own = scratch(HISTORY), scratch(NN), watching(p)
     begin_derivatives(kept)
     begin, h = t[0], (t[K - 1] - t[0]) / steps
     y, R = load_vector(x, 0, N), first_derivative()
     at = HISTORY
     k = 1
+    watch_from(begin, h, y, own)
     for i in range(ORDER):
         here = begin + i * h
         if i > 0:
-            y, R = stepped(here - h, h, y, R, p)
-        f, G = rates_of(here, y, R, p)
+            z, Z = stepped(here - h, h, y, R, own)
+            if may_pass(here - h, h, z, own):
+                done[0], done[1], done[2] = i - 1, k - 1, begin + (i - 1) * h
+                store(last, 0, y)
+                write_last(last_Phi, R, kept)
+                return
+            while k < K and t[k] <= here:
+                w, W = stepped(here - h, t[k] - (here - h), y, R, own)
+                store(x, k * N, w)
+                write_derivative(Phi, k, W, kept)
+                k += 1
+            y, R = z, Z
+        f, G = rates_of(here, y, R, own)
         at -= SLOT
         keep(F, at, f, G)
-        while i + 1 < ORDER and k < K and t[k] <= here + h:
-            z, Z = stepped(here, t[k] - here, y, R, p)
-            store(x, k * N, z)
-            write_derivative(Phi, k, Z, kept)
-            k += 1
     sx, sv, SX, SV = corrected(F, at)
     v1, V1 = (1.0 / h) * driven(y) - sv, (1.0 / h) * driven_rows(R) - SV
     q2 = (1.0 / (h * h)) * positions(y) - doubled(sx) + doubled(v1)
@@ -55,7 +65,14 @@ def run_multistep(K: int, t: Array, steps: int, p: Given, x: Array, Phi: Array) 
         sx, sv, SX, SV = predicted(F, at)
         z = joined(y, (h * h) * (q2 + doubled(sx)), h * (v1 + sv))
         Z = joined_rows((h * h) * (Q2 + doubled_rows(SX)), h * (V1 + SV))
-        f, G = rates_of(here, z, Z, p)
+        if may_pass(here - h, h, z, own):
+            done[0], done[1], done[2] = i - 1, k - 1, begin + (i - 1) * h
+            sx, sv, SX, SV = corrected(F, at)
+            store(last, 0, joined(y, (h * h) * (q2 - doubled(v1) + doubled(sx)), h * (v1 + sv)))
+            Z = joined_rows((h * h) * (Q2 - doubled_rows(V1) + doubled_rows(SX)), h * (V1 + SV))
+            write_last(last_Phi, Z, kept)
+            return
+        f, G = rates_of(here, z, Z, own)
         at -= SLOT
         keep(F, at, f, G)
         new, NEW = v1 + driven(f), V1 + driven_rows(G)

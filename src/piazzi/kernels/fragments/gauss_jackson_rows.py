@@ -12,7 +12,7 @@ def first_derivative():
 @inline
 def rates_of(t, x, R, p):
     """Rates of the state and of the rows."""
-    return rhs(t, x, R, p)
+    return rate_jacobian(t, x, R, p)
 
 
 @inline
@@ -94,3 +94,9 @@ def write_derivative(Phi, k, R, kept):
     whole = complete(R)
     store(Phi, (k - 1) * N * N, quotient(whole, load_matrix(kept, 0, N, N)))
     store(kept, 0, whole)
+
+
+@inline
+def write_last(Phi, R, kept):
+    """The transition matrix from the last epoch that was written."""
+    store(Phi, 0, quotient(complete(R), load_matrix(kept, 0, N, N)))

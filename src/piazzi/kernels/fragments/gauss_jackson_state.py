@@ -12,7 +12,7 @@ def first_derivative():
 @inline
 def rates_of(t, x, R, p):
     """Rates of the state."""
-    return dynamics(t, x, p), 0.0
+    return rate(t, x, p), 0.0
 
 
 @inline
@@ -63,4 +63,9 @@ def begin_derivatives(kept):
 
 @inline
 def write_derivative(Phi, k, R, kept):
+    """Nothing is written."""
+
+
+@inline
+def write_last(Phi, R, kept):
     """Nothing is written."""
