@@ -25,7 +25,8 @@ finally:
 PAGES = sorted(p for p in DOCS.rglob("*.md") if any(b.language in ("python", "console") for b in blocks.blocks(p.read_text())))
 
 
-SLOW = {"sensors", "ceres"}  # kernels of half a minute
+QUICK = {"pendulum", "car", "which-window", "thousand-runs"}
+SLOW = {"sensors", "ceres"} | {p.stem for p in (DOCS / "gallery").glob("*.md")} - QUICK  # kernels of half a minute
 
 
 @pytest.mark.parametrize("page", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in SLOW)) for p in PAGES])
@@ -36,6 +37,15 @@ def test_the_code_of_a_page_runs_and_gives_what_the_page_says(page, tmp_path):
 @pytest.mark.parametrize("page", [pytest.param(p, id=p.stem) for p in PAGES if p.stem != "founding-texts"])
 def test_numbers_of_the_prose_are_in_the_code_or_its_results(page):
     assert blocks.unfounded(page.read_text()) == []
+
+
+def test_every_page_of_the_gallery_has_its_picture_its_notebook_and_a_place_in_the_index():
+    index = (DOCS / "index.md").read_text()
+    for page in (DOCS / "gallery").glob("*.md"):
+        text = page.read_text()
+        assert re.search(r"!\[[^]]{20,}\]\(made/[\w-]+\.svg\)", text), f"{page.stem} has no picture that is said in words"
+        assert f"(made/{page.stem}.ipynb)" in text
+        assert f"(gallery/{page.stem}.md)" in index and f"\ngallery/{page.stem}\n" in index
 
 
 def test_the_tutorials_and_guides_are_among_them():

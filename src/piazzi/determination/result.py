@@ -24,6 +24,7 @@ from piazzi.text import listed, one_line
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
     from rich.console import Console, ConsoleOptions, RenderResult
 
 
@@ -191,6 +192,24 @@ class Determination:
         from piazzi.evaluate.latex import as_latex
 
         return as_latex(grids(self, document(self)))
+
+    def plot(self, ax: Axes | None = None, *, what: str = "residuals", which: str | None = None) -> Axes:
+        """Draw it on these axes, or on new ones; returns them.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes; polar ones for the sky
+        what : "residuals", "sigma" (of position along R, T and N), "orbit", "ground-track" or "sky"
+        which : the kind of residuals, the plane of the orbit ("xy", "yz", "xz"), the station whose sky it is; default the first
+
+        Raises
+        ------
+        ValueError
+            For what there is not.
+        """
+        from piazzi.determination.plotting import plot
+
+        return plot(self, ax, what, which)
 
     def figures(self, folder: Any, formats: Any = "pdf", width: Any = "88mm") -> Any:
         """Write pictures for papers into a folder; returns their paths."""
