@@ -30,11 +30,12 @@ problem tracking orbit
 scenarios
 simulation
 estimate
-io loading
+io
 evaluate
 study
 present
 determination
+loading
 __init__
 cli
 __main__

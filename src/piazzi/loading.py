@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.inputs import prepare
 from piazzi.scenarios import Recording, load_scenario, names
+from piazzi.scenarios.loader import tables_of
 
 KINDS = (".npz", ".nc", ".csv", ".toml")
 
@@ -24,21 +26,28 @@ def load(
     scenario: str | os.PathLike[str] | None = None,
     scale: str | None = None,
     columns: Mapping[str, str] | str | None = None,
+    stations: Any = None,
+    object: str | None = None,  # noqa: A002  # as everywhere
+    sigma: str | Sequence[str] = (),
+    **conventions: Any,
 ) -> tuple[Problem, Tracking]:
-    """Problem and tracking of a recording, or of a scenario simulated with `seed`.
+    """Problem and tracking of a recording, of a file of tracking, or of a scenario simulated with `seed`.
 
     Parameters
     ----------
     source : name of a built-in scenario, or a path
-        ``.npz`` (founding layout), ``.nc``, ``.csv`` (with `scenario`), or a scenario's ``.toml``.
+        ``.npz`` (founding layout), ``.nc``, ``.csv`` (with `scenario`), a scenario's ``.toml``, or with `scenario` any file
+        that `read_tracking` knows (TDM, CRD, SP3, ...); a ``.csv`` is one too where the scenario has no stations of its own.
     seed : int
         Of the simulation; recordings do not use it.
     scenario : name or path, optional
-        The problem that a ``.csv`` measures.
+        The problem that a ``.csv`` or file of tracking measures.
     scale : UTC, TAI, TT, TDB, TCG, GPS or UT1, optional
         Of dates in a ``.csv`` that name none; default what the scenario's [recording] says.
     columns : mapping of a name here to a column of the file, or text such as ``"range=RNG[km] week=gps_week sow=gps_tow"``
         For a ``.csv`` with other names; default what the scenario's [recording] says.
+    stations, object, sigma, conventions : files of stations, name, texts such as ``"range.BER=10m"``, ``frame``, ``range``, ...
+        What files of tracking do not say, as `read_tracking` takes it; default what the scenario's [recording] says.
 
     Dates become seconds past the problem's epoch.  One without an epoch, whose prior is at the first measurement, gets that of
     the file.
@@ -53,10 +62,28 @@ def load(
     ValueError
         For an unknown scenario or a file with something wrong in it: what, the value, and where.
     """
-    problem, tracking = _loaded(os.fspath(source), seed, scenario, Recording(_mapping(columns), scale))
+    listed = {"sigma": sigma, "stations": () if stations is None else stations}
+    texts = {name: (given,) if isinstance(given, str | os.PathLike) else tuple(given) for name, given in listed.items()}
+    frame = conventions.pop("frame", None)
+    said = Recording(_mapping(columns), scale, object, frame=frame, answers=conventions, **texts)
+    if is_tracking(os.fspath(source), scenario):
+        from piazzi.determination.recorded import recorded
+
+        assert scenario is not None, "files of tracking have one"
+        return recorded(source, scenario, said)
+    problem, tracking = _loaded(os.fspath(source), seed, scenario, said)
     with contextlib.suppress(ValueError):  # estimators say what does not fit
         prepare(problem, tracking)
     return problem, tracking
+
+
+def is_tracking(source: str, scenario: str | os.PathLike[str] | None) -> bool:
+    """Whether a source is a file of tracking that a scenario makes a problem of: no recording, and no scenario itself."""
+    if not scenario or source in ("-", *names()):
+        return False
+    if source.lower().endswith(".csv"):
+        return "stations" not in tables_of(scenario)[0]
+    return not source.lower().endswith(KINDS)
 
 
 def _with_prior_before(text: str, problem: Problem, tracking: Tracking) -> tuple[Problem, Tracking]:
@@ -83,7 +110,9 @@ def _mapping(columns: Mapping[str, str] | str | None) -> Mapping[str, str]:
 def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, said: Recording) -> tuple[Problem, Tracking]:
     kind = Path(text).suffix.lower()
     if said != Recording() and kind != ".csv":
-        raise ValueError(f"{text}: {'--columns' if said.columns else '--scale'} is for a .csv file")
+        given = next(f.name for f in fields(said) if getattr(said, f.name) != getattr(Recording(), f.name))
+        word = next(iter(said.answers)) if given == "answers" else {"chosen": "object"}.get(given, given)
+        raise ValueError(f"{text}: --{word} is for files of tracking, with --scenario")
     if scenario is not None and kind != ".csv":
         raise ValueError(f"{text}: only a .csv file is loaded with a scenario; this one holds its own problem")
     if kind == ".npz":
@@ -106,7 +135,7 @@ def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, said:
             problem = replace(problem, epoch=tracking.epoch)
         return _with_prior_before(text, problem, tracking)
     if kind != ".toml" and os.path.isfile(text):
-        raise ValueError(f"{text}: files end in {', '.join(KINDS)}, not {kind!r}")
+        raise ValueError(f"{text}: files end in {', '.join(KINDS)}, not {kind!r}; those of tracking need a scenario")
     found = load_scenario(text)
     from piazzi.simulation import simulate
 

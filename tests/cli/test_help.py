@@ -80,7 +80,7 @@ def test_no_command_shows_the_help(call):
         (["xyz"], "unknown command 'xyz'; known: determine, tracking, propagate"),
         (["estimate"], "estimate: missing argument 'SOURCE'"),
         (["estimate", "a", "b"], "estimate: got unexpected extra argument (b)"),
-        (["estimate", "a", "--wth", "ekf"], "did you mean '--with'?"),
+        (["estimate", "a", "--wiht", "ekf"], "did you mean '--with'?"),
         (["estimate", "a", "--with"], "option '--with' requires an argument"),
         (["estimate", "a", "--seed", "x"], "'--seed'"),
         (["estimate", "a", "--seed", "-1"], "'--seed': -1 is not in the range"),

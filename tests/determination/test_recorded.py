@@ -170,9 +170,45 @@ def test_a_prior_that_is_later_than_the_file_begins_is_propagated_back(files):
     np.testing.assert_allclose(problem.prior.mean, np.concatenate(pz.propagate_kepler(R, V, GM, 0.0)), rtol=1e-8)
 
 
-def test_stations_of_a_file_have_its_epoch(files, data_dir):
-    """Where a station stands is a table of the time past the file's epoch: another one would turn the Earth."""
-    prior = f"[prior]\nmean = {[*R.tolist(), *V.tolist()]}\nsigma = {[1.0] * 6}\n"
-    (files / "s.toml").write_text('epoch = "2016-02-11T00:00:00 UTC"\n' + SCENARIO + prior)
-    with pytest.raises(ValueError, match="leave out the scenario's epoch"):
-        recorded(data_dir / "earth/lageos2/lageos2_20160214.npt", files / "s.toml", Recording(stations=("ilrs",)))
+def test_stations_turn_with_the_epoch_of_the_scenario(files, data_dir):
+    """Where a station stands is a table of the time past the epoch: the same measurements whatever that is."""
+    start = pz.Epoch("2016-02-11T00:00:00 UTC")
+    prior = f"[prior]\ntime = 0.0\nmean = {[*R.tolist(), *V.tolist()]}\nsigma = {[1.0] * 6}\n"
+    found = []
+    for epoch in ("", f'epoch = "{start}"\n'):
+        (files / "s.toml").write_text(epoch + SCENARIO + prior)
+        found.append(recorded(data_dir / "earth/lageos2/lageos2_20160214.npt", files / "s.toml", Recording(stations=("ilrs",))))
+    (own, rows), (other, same) = found
+    assert other.epoch == start and 48575.0 < own.epoch - start < 48577.0  # 13:29:36.7
+    np.testing.assert_allclose(same.times - rows.times, own.epoch - start, atol=1e-9)
+    assert other.prior_time == 0.0
+    for a, b in zip(own.stations, other.stations, strict=True):
+        x, y = (np.asarray(s.place.station.place(own.epoch)) for s in (a, b))
+        assert a.place.epoch == own.epoch and b.place.epoch == start and (x == y).all()
+
+
+@pytest.mark.parametrize("there", ["a word", "the scenario"])
+def test_what_a_file_leaves_open_is_said_as_a_word_or_in_the_scenario(files, there):
+    """Columns of a radar whose ranges are there and back, corrected already."""
+    rows = "\n".join(f"2016-02-13T16:0{i}:00Z,D,{2 * (1e6 + 1e4 * i)}" for i in range(4))
+    (files / "pass.csv").write_text(f"time,station,range [m]\n{rows}\n")
+    (files / "d.toml").write_text('[[stations]]\nname = "D"\nlatitude = "50 deg"\nlongitude = "8 deg"\nheight = "100 m"\n')
+    prior = f"[prior]\ntime = 0.0\nmean = {[*R.tolist(), *V.tolist()]}\nsigma = {[1.0] * 6}\n"
+    said = {"range": "round-trip", "tag": "receive", "corrections": "applied"}
+    told = "".join(f'{name} = "{word}"\n' for name, word in said.items()) if there == "the scenario" else ""
+    scenario = SCENARIO.replace('["2m", "0.1m/s"]', '["2m"]') + told + prior
+    (files / "s.toml").write_text(scenario)
+    words = {} if told else said
+    problem, tracking = pz.load(files / "pass.csv", scenario=files / "s.toml", stations=files / "d.toml", **words)
+    np.testing.assert_allclose(tracking.values[:, 0], 1e6 + 1e4 * np.arange(4.0))
+    assert [s.name for s in problem.model.sensors] == ["range_two_way_reception"]
+    with pytest.raises(ValueError, match="--range"):
+        (files / "s.toml").write_text(scenario.replace('range = "round-trip"\n', ""))
+        pz.load(files / "pass.csv", scenario=files / "s.toml", stations=files / "d.toml", tag="receive")
+
+
+def test_a_file_of_tracking_without_a_scenario_is_refused_with_what_it_needs(files):
+    with pytest.raises(ValueError, match="one.oem: .*those of tracking need a scenario"):
+        pz.load(files / "one.oem")
+    with pytest.raises(ValueError, match="--range is for files of tracking"):
+        pz.load("b612-range", range="two-way")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from piazzi.cli import options, results
+from piazzi.cli.conventions import recording as recording_options
 
 if TYPE_CHECKING:
     from piazzi.evaluate import Comparison
@@ -23,7 +24,7 @@ DEFAULT = ("ekf", "graph", "window:100")
 @options.as_json
 @options.seed
 @options.scenario
-@options.recording
+@recording_options
 @results.report_option
 def command(
     source: str,

@@ -1,13 +1,14 @@
-"""Options that say what tracking files do not."""
+"""Options that say what files of tracking and other recordings do not."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from functools import wraps
+from typing import Any, cast
 
 import click
 
-from piazzi.cli.options import F
+from piazzi.cli.options import F, number
 
 _OPTIONS: tuple[tuple[str, str, str, bool], ...] = (
     ("range", "WAY", "What ranges are: one-way, two-way (half of the way there and back), round-trip or three-way.", False),
@@ -38,7 +39,39 @@ def told(options: dict[str, Any]) -> dict[str, Any]:
     """The words that were given, by the names that `read_tracking` takes; raises click.BadParameter for no number."""
     found = {name: value for name, value in options.items() if value not in (None, ())}
     if "interval" in found:
-        from piazzi.cli.options import number
-
         found["interval"] = number(found["interval"])
     return found
+
+
+SCALES = ("UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1")
+# Of recordings these are shown by --help, in these words; the others are said as to `piazzi tracking`.
+_SHOWN = {
+    "columns": "Columns of tables by their names here, such as 'range=RNG[km] week=gps_week sow=gps_tow'.",
+    "scale": f"Time scale of dates that state none: {', '.join(SCALES)}.",
+    "frame": "Frame of positions that state none: ITRF, EME2000, ...",
+    "sigma": "Sigmas of tracking: 10m, range=10m; may be repeated.  --range, --tag, ... as piazzi tracking has them.",
+}
+
+
+def recording(function: F) -> F:
+    """Options of recordings and files of tracking, as one argument `recording`."""
+
+    @wraps(function)
+    def command(*args: Any, **rest: Any) -> Any:
+        from piazzi.scenarios import Recording
+        from piazzi.tables.names import parse_columns
+
+        answers = told({name.replace("-", "_"): rest.pop(name.replace("-", "_")) for name, *_ in _OPTIONS})
+        words = {name: rest.pop(name) for name in ("chosen", "stations")}
+        words |= {name: answers.pop(name) for name in ("scale", "sigma", "frame") if name in answers}
+        columns = parse_columns(answers.pop("columns", ""))
+        return function(*args, recording=Recording(columns, answers=answers, **words), **rest)
+
+    text = "Stations of tracking: SINEX, TOML, ilrs or mpc; may be repeated."
+    command = click.option("--stations", multiple=True, metavar="FILE", help=text)(command)
+    command = click.option("--object", "chosen", metavar="NAME", help="Object to use where tracking has several.")(command)
+    for name, metavar, text, several in sorted(_OPTIONS, key=lambda option: option[0] in _SHOWN):
+        kind = click.Choice(SCALES, case_sensitive=False) if name == "scale" else None
+        hidden, said = name not in _SHOWN, _SHOWN.get(name, text)
+        command = click.option(f"--{name}", metavar=metavar, type=kind, multiple=several, hidden=hidden, help=said)(command)
+    return cast(F, command)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from piazzi.cli import options, output
+from piazzi.cli.conventions import recording as recording_options
 from piazzi.cli.running import DONE, NOT_ESTIMATED, say
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ ENDINGS = (".json", ".csv", ".npz", ".nc")
 @options.as_json
 @options.seed
 @options.scenario
-@options.recording
+@recording_options
 @click.option(
     "--predict",
     "ahead",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from piazzi.cli import options, results
+from piazzi.cli.conventions import recording as recording_options
 
 if TYPE_CHECKING:
     from piazzi.evaluate.observable import Observability
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 @options.as_json
 @options.seed
 @options.scenario
-@options.recording
+@recording_options
 @results.report_option
 def command(
     source: str,

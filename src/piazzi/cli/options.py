@@ -8,9 +8,8 @@ import re
 import stat
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from contextlib import suppress
-from functools import wraps
 from itertools import combinations
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
@@ -40,33 +39,7 @@ scenario = click.option(
     shell_complete=_scenarios,
     help="Scenario that defines the problem, for CSV and tracking files.",
 )
-SCALES = ("UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1")
 STREAM = "-"
-STATIONS = "Stations of tracking: SINEX, TOML, ilrs or mpc; may be repeated."
-
-
-def recording(function: F) -> F:
-    """Options of recordings and files of tracking, as one argument `recording`."""
-
-    @wraps(function)
-    def command(*args: Any, scale: str | None, columns: str | None, **rest: Any) -> Any:
-        from piazzi.scenarios import Recording
-        from piazzi.tables.names import parse_columns
-
-        words = {name: rest.pop(name) for name in ("chosen", "sigma", "stations", "frame")}
-        return function(*args, recording=Recording(parse_columns(columns or ""), scale, **words), **rest)
-
-    scales = click.Choice(SCALES, case_sensitive=False)
-    said = f"Time scale of CSV dates that state none: {', '.join(SCALES)}."
-    text = "Columns of CSV input by their names here, such as 'range=RNG[km] week=gps_week sow=gps_tow'."
-    command = click.option("--stations", multiple=True, metavar="FILE", help=STATIONS)(command)
-    command = click.option(
-        "--sigma", multiple=True, metavar="SIGMA", help="Sigmas of tracking: 10m, range=10m; may be repeated."
-    )(command)
-    command = click.option("--object", "chosen", metavar="NAME", help="Object to use where tracking has several.")(command)
-    command = click.option("--frame", metavar="AXES", help="Frame of positions that state none: ITRF, EME2000, ...")(command)
-    command = click.option("--scale", metavar="SCALE", type=scales, help=said)(command)
-    return cast(F, click.option("--columns", metavar="NAMES", help=text)(command))
 
 
 class WholeNumber(click.IntRange):

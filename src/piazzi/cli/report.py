@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from piazzi.cli import options, output, results
+from piazzi.cli.conventions import recording as recording_options
 from piazzi.cli.running import DONE, NOT_ESTIMATED, say
 from piazzi.cli.windows import whole_numbers
 
@@ -39,7 +40,7 @@ def _lags(context: click.Context, parameter: click.Parameter, text: str | None) 
 @click.option("--title", metavar="TEXT", help="Title of the page.")
 @options.seed
 @options.scenario
-@options.recording
+@recording_options
 def command(
     sources: tuple[str, ...],
     names: tuple[str, ...],
@@ -65,7 +66,8 @@ def command(
         raise click.UsageError("-o -: a page goes into a file", click.get_current_context(silent=True))
     output.check_output(output_file, results.PAGES)
     estimators = options.parsed(names, DEFAULT)
-    from piazzi.cli.sources import is_tracking, run_comparison
+    from piazzi.cli.sources import run_comparison
+    from piazzi.loading import is_tracking
     from piazzi.present.report import comparison_tab
 
     tabs, success = [], True

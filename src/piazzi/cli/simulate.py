@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from piazzi.cli import options, output
+from piazzi.cli.conventions import recording as recording_options
 from piazzi.cli.running import DONE
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ ENDINGS = (".nc", ".csv", ".npz")
 @options.as_json
 @options.seed
 @options.scenario
-@options.recording
+@recording_options
 @click.option(
     "--tolerance",
     type=options.number,

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -42,9 +42,10 @@ def load_source(source: str, seed: int, scenario: str | None = None, recording: 
     """What `piazzi.loading` makes of a source, or of standard input for "-"; raises as that does."""
     from piazzi import load
     from piazzi.io.files import RECORDINGS
+    from piazzi.loading import is_tracking
     from piazzi.scenarios import Recording
 
-    told: dict[str, Any] = {} if recording is None else {"scale": recording.scale, "columns": recording.columns}
+    told = {} if recording is None else {"scale": recording.scale, "columns": recording.columns}
     if not source:
         raise click.UsageError("SOURCE is empty", click.get_current_context(silent=True))
     if source.lower().endswith(".csv") and not scenario:
@@ -69,20 +70,6 @@ def load_source(source: str, seed: int, scenario: str | None = None, recording: 
     found = Source(problem, tracking, STDIN, path.suffix in RECORDINGS)
     _say_moved_prior(found, scenario)
     return found
-
-
-def is_tracking(source: str, scenario: str | None) -> bool:
-    """Whether a source is a file of tracking that a scenario makes a problem of: no recording, and no scenario itself."""
-    from piazzi.loading import KINDS
-    from piazzi.scenarios import names
-
-    if not scenario or source in (STDIN, *names()):
-        return False
-    if source.lower().endswith(".csv"):
-        from piazzi.determination.recorded import measures_nothing
-
-        return measures_nothing(scenario)
-    return not source.lower().endswith(KINDS)
 
 
 def _say_moved_prior(found: Source, scenario: str | None) -> None:

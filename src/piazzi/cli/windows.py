@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from piazzi.cli import options, output, results
+from piazzi.cli.conventions import recording as recording_options
 
 if TYPE_CHECKING:
     from piazzi.present.report import Tab
@@ -47,7 +48,7 @@ def whole_numbers(context: click.Context, parameter: click.Parameter, text: str)
 @options.as_json
 @options.seed
 @options.scenario
-@options.recording
+@recording_options
 @results.report_option
 def command(
     source: str,

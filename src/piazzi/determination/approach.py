@@ -70,12 +70,19 @@ def approached(given: Setup) -> Setup:
 
 
 def _wide(given: Setup, here: Place) -> Array:
-    """Covariance (n, n) of a prior that is `WIDER` than what the measurements leave, and nowhere wider than a guess."""
+    """Covariance (s, s) of a prior of states, `WIDER` than what the measurements leave, and nowhere wider than a guess.
+
+    What they leave is that beside constants as uncertain as they are: with states last, a triangular root of the information
+    of everything ends in that of the states alone.
+    """
     unit = scale_of(given, here.states[0])
     keep = np.ones(len(given.rows), dtype=np.bool_)
-    root = factor(np.vstack([analysed(given, here.states).information(keep, unit) / WIDER, np.eye(len(unit))]))
-    inverse = np.linalg.solve(root, np.eye(len(unit)))
-    return np.asarray(inverse @ inverse.T * np.outer(unit, unit))
+    s = len(given.problem.model.states)
+    everything = analysed(given, here.states).information(keep, unit)
+    alone = factor(np.roll(everything, -s, axis=1))[-s:, -s:]
+    root = factor(np.vstack([alone / WIDER, np.eye(s)]))
+    inverse = np.linalg.solve(root, np.eye(s))
+    return np.asarray(inverse @ inverse.T * np.outer(unit[:s], unit[:s]))
 
 
 def _state_at(given: Setup, t: float) -> Array:

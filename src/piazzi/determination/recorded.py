@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.sensing import Measured, measured, of_object
+from piazzi.earth import Epoch
 from piazzi.estimate.prior import with_prior_at
 from piazzi.formats import read_tracking
 from piazzi.model import Parameter
@@ -20,6 +21,8 @@ from piazzi.problem.checks import Array
 from piazzi.scenarios import Recording, ScenarioError
 from piazzi.scenarios.loader import read_scenario, tables_of
 from piazzi.scenarios.orbit_prior import KEYS
+from piazzi.scenarios.scenario import read_recording
+from piazzi.scenarios.table import Faults, Table
 from piazzi.units import Units
 
 START_SIGMA = (1e3, 1e3, 1e3, 10.0, 10.0, 10.0)  # m and m/s, of a start from positions
@@ -48,14 +51,16 @@ def recorded(path: str | os.PathLike[str], scenario: str | os.PathLike[str], sai
     tables, faults = tables_of(scenario)
     usual = _recording(tables)
     words = {name: getattr(said, name) or getattr(usual, name) for name in ("sigma", "columns", "scale", "frame")}
-    observations = read_tracking(path, **{name: word for name, word in words.items() if word})
-    found = measured(of_object(observations, said.chosen or usual.chosen), list(said.stations or usual.stations) or None)
+    answers = {**usual.answers, **said.answers, **{name: word for name, word in words.items() if word}}
+    observations = of_object(read_tracking(path, **answers), said.chosen or usual.chosen)
+    stations = list(said.stations or usual.stations) or None
+    found = measured(observations, stations, corrections=answers.get("corrections"), epoch=_epoch(tables))
     name = os.path.basename(os.fspath(scenario)).removesuffix(".toml")
     read = None if faults else read_scenario(_with_measurements(tables, found, os.fspath(path)), name, faults)
     if read is None:
         raise ScenarioError(os.fspath(scenario), list(faults))
     problem = _measuring(read.problem, found)
-    tracking = found.tracking.with_epoch(problem.epoch)
+    tracking = found.tracking
     first = float(tracking.times[0])
     if problem.prior_time is not None and problem.prior_time > first:
         problem = with_prior_at(problem, first)
@@ -65,31 +70,20 @@ def recorded(path: str | os.PathLike[str], scenario: str | os.PathLike[str], sai
 def _recording(tables: Mapping[str, Any]) -> Recording:
     """What the scenario says of recordings, as far as it is sound; the rest is found when it is read."""
     given = tables.get("recording")
-    given = given if isinstance(given, Mapping) else {}
-    listed = {key: [given[key]] if isinstance(given.get(key), str) else given.get(key) or [] for key in ("sigma", "stations")}
-    columns = given.get("columns")
-    return Recording(
-        columns=columns if isinstance(columns, Mapping) else {}, scale=given.get("scale"), frame=given.get("frame"),
-        chosen=given.get("object"), sigma=tuple(listed["sigma"]), stations=tuple(listed["stations"]),
-    )  # fmt: skip
+    return read_recording(Table(given if isinstance(given, Mapping) else {}, "recording", Faults()))
 
 
-def measures_nothing(scenario: str | os.PathLike[str]) -> bool:
-    """Whether a scenario has no stations of its own, so that a table is tracking for it."""
-    return "stations" not in tables_of(scenario)[0]
+def _epoch(tables: Mapping[str, Any]) -> Epoch | None:
+    """The epoch that the scenario says, None where it says none."""
+    return Epoch(tables["epoch"]) if isinstance(tables.get("epoch"), str) else None
 
 
 def _with_measurements(tables: Mapping[str, Any], found: Measured, path: str) -> dict[str, Any]:
     """The tables with the file's times, no stations, and a start where they have none."""
-    from piazzi.earth import Epoch
-
     units = Units.parse(tables["units"]) if isinstance(tables.get("units"), str) else Units()
     out = {key: value for key, value in tables.items() if key not in ("stations", "sensors", "truth", "study", "times")}
-    epoch = found.epoch
-    if isinstance(tables.get("epoch"), str):
-        epoch = Epoch(tables["epoch"])
-    out["epoch"] = epoch.exact()
-    times = found.tracking.with_epoch(epoch).times
+    out["epoch"] = found.epoch.exact()
+    times = found.tracking.times
     out["times"] = {"list": [float(times[0]) / units.time()]}
     out["stations"] = []
     prior = tables.get("prior", {})
@@ -157,14 +151,6 @@ def _measuring(problem: Problem, found: Measured) -> Problem:
         model=measuring,
         stations=found.stations,
         parameters={**{name: value for name, (_, value) in found.parameters.items()}, **problem.parameters},
-        functions={**problem.functions, **_dated(found, problem)},
+        functions={**problem.functions, **found.functions},
         truth=None,
     )
-
-
-def _dated(found: Measured, problem: Problem) -> Mapping[str, Any]:
-    """The data of sensors; they are of the epoch that times of the file are past."""
-    placed = any(station.place is not None for station in found.stations)
-    if (found.functions or placed) and found.epoch != problem.epoch:
-        raise ValueError(f"times of these sensors are past {found.epoch.exact()}: leave out the scenario's epoch")
-    return found.functions

@@ -102,7 +102,7 @@ def measured(
     name : of the object, where the files do not say it
     about : what the orbit goes about
     antenna : where fixes are taken, m from the centre of mass along R, T and N
-    epoch : time zero of the tracking; default the second in which the first row is
+    epoch : time zero of the problem; default the second in which the first row is
 
     Raises
     ------

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import floor
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from piazzi.text import shown
 from piazzi.units import Units
 
 MAX_EPOCHS = 10**7
+ANSWERS = ("range", "angles", "tag", "corrections", "interval_reference", "repair", "debias")  # of files, as text
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,7 @@ class Recording:
     sigma : standard deviations that such files do not say, as ``range.BER=10m``
     stations : files of stations for them
     frame : axes of fixes that do not say theirs
+    answers : whatever else such files leave open, by the names that `read_tracking` takes
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -60,6 +63,7 @@ class Recording:
     sigma: tuple[str, ...] = ()
     stations: tuple[str, ...] = ()
     frame: str | None = None
+    answers: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +95,10 @@ def read_recording(table: Table) -> Recording:
     columns = {ours: theirs for ours in inner.data if (theirs := inner.text(ours))}
     scale, chosen, frame = table.text("scale"), table.text("object"), table.text("frame")
     sigma, stations = table.texts("sigma"), table.texts("stations")
+    answers: dict[str, Any] = {name: table.text(name) for name in ANSWERS}
+    answers |= {"interval": table.number("interval", positive=True), "time": table.texts("time")}
     table.finish()
-    return Recording(columns, scale, chosen, sigma, stations, frame)
+    return Recording(columns, scale, chosen, sigma, stations, frame, {k: v for k, v in answers.items() if v})
 
 
 def read_plan(table: Table) -> Plan:
