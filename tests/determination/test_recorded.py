@@ -208,7 +208,7 @@ def test_what_a_file_leaves_open_is_said_as_a_word_or_in_the_scenario(files, the
 
 
 def test_a_file_of_tracking_without_a_scenario_is_refused_with_what_it_needs(files):
-    with pytest.raises(ValueError, match="one.oem: .*those of tracking need a scenario"):
+    with pytest.raises(ValueError, match=r"one.oem: .*those of tracking need a scenario"):
         pz.load(files / "one.oem")
     with pytest.raises(ValueError, match="--range is for files of tracking"):
         pz.load("b612-range", range="two-way")
