@@ -45,7 +45,7 @@ def load_source(source: str, seed: int, scenario: str | None = None, recording: 
     from piazzi.loading import is_tracking
     from piazzi.scenarios import Recording
 
-    told = {} if recording is None else {"scale": recording.scale, "columns": recording.columns}
+    told: dict[str, Any] = {} if recording is None else {"scale": recording.scale, "columns": recording.columns}
     if not source:
         raise click.UsageError("SOURCE is empty", click.get_current_context(silent=True))
     if source.lower().endswith(".csv") and not scenario:
