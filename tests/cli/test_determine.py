@@ -85,6 +85,15 @@ def test_what_is_printed_and_shown(folder):
         (["one.oem", "--estimate", "cd"], "no unknown"),
         (["one.oem", "--mass", "-3"], "positive"),
         (["one.oem", "--each", "-o", "out.oem"], "{object}"),
+        (["one.oem", "--each", "--report", "page"], "--report page: with --each the name has {object} in it"),
+        (["one.oem", "--each", "--figures", "page"], "--figures page: with --each"),
+        (["one.oem", "--each", "--object", "SAT"], "do not go together"),
+        (["one.oem", "--figures", "one.oem"], "one.oem"),
+        (["one.oem", "-o", "a.oem", "-o", "a.oem"], "given twice"),
+        (["one.oem", "--span", "last .. first"], "ends before it begins"),
+        (["one.oem", "--from", "2026-11-03Z"], "--prior, which is not given"),
+        (["one.oem", "--follow", "--show"], "do not go together"),
+        (["-"], "standard input is followed: add --follow"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(folder, arguments, says):

@@ -20,7 +20,7 @@ class WithCase(options.WithEstimators):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         every = ctx.meta.get("piazzi.help_all", False)
-        shown = [p for p in self.get_params(ctx) if every or p.name in (*USUAL, "help", "help_all")]
+        shown = [p for p in self.get_params(ctx) if (every and isinstance(p, click.Option)) or p.name in (*USUAL, "help_all")]
         records = [record for p in shown if (record := p.get_help_record(ctx)) is not None]
         with formatter.section("Options"):
             formatter.write_dl(records)

@@ -45,6 +45,7 @@ def command(files: tuple[str, ...], **given: Any) -> int:
         z=1464km vx=3.03km/s vy=1.72km/s vz=-4.45km/s
         epoch=2016-02-13T16:00:00Z frame=EME2000"
       piazzi determine night.tdm --span "first .. last+3d" -o next.oem --json
+      receiver | piazzi determine - --follow --prior last.json -o next.oem
 
     Exit status: 0 determined, 2 bad usage or input, 3 not determined.
     """
@@ -63,6 +64,8 @@ def command(files: tuple[str, ...], **given: Any) -> int:
     from piazzi.determination.determining import objects_in
     from piazzi.determination.initial_result import UndeterminedError
 
+    if case.follow and case.show:
+        raise click.UsageError("--follow and --show do not go together", click.get_current_context())
     if case.follow:
         return _follow(files, case)
     status = DONE
@@ -157,7 +160,13 @@ def _check_outputs(case: Case, files: Sequence[str]) -> None:
         if case.each:
             raise click.UsageError("--save and --each do not go together", click.get_current_context())
         output.check_output(case.save, (".toml",), "--save")
-    results.check_report(case.report)
+    for option, folder in (("--report", case.report), ("--figures", case.figures)):
+        if case.each and folder is not None and "{object}" not in folder:
+            raise click.UsageError(f"{option} {folder}: with --each the name has {{object}} in it", click.get_current_context())
+    if not case.each:
+        results.check_report(case.report)
+    if case.figures is not None and not case.each:
+        output.make_folder(Path(case.figures), "pictures")
 
 
 def _write(found: Determination, case: Case) -> list[str]:
@@ -171,10 +180,11 @@ def _write(found: Determination, case: Case) -> list[str]:
         found.write(target, span=case.span, step=case.step, formal=case.covariance == "formal")
         wrote.append(f"Wrote {target}")
     if case.figures is not None:
-        paths = found.figures(case.figures, case.format, case.width)
-        wrote.append(f"Wrote {len(paths)} pictures into {case.figures}")
+        folder = case.figures.replace("{object}", _file_name(found.object))
+        paths = found.figures(folder, case.format, case.width)
+        wrote.append(f"Wrote {len(paths)} pictures into {folder}")
     if case.report is not None:
-        wrote.append(f"Wrote {found.report(case.report)}")
+        wrote.append(f"Wrote {found.report(case.report.replace('{object}', _file_name(found.object)))}")
     return wrote
 
 

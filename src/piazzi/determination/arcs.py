@@ -59,12 +59,13 @@ def check_span(span: Any) -> None:
     """Raise ValueError for a span that cannot be read, before there is a result."""
     if span is None:
         return
-    any_date = Epoch.at(0.0)
+    zero, soon, late = Epoch.at(0.0), Epoch.at(1.0), Epoch.at(1e10)
     ends = span.split("..") if isinstance(span, str) else list(span)
     if len(ends) != 2:
         raise ValueError(f'--span {span!r}: write two ends with .. between them, as "first .. last+3d"')
-    for one in ends:
-        end_of(one, any_date, any_date, any_date)
+    told = [[end_of(one, zero, last, usual) for one, usual in zip(ends, (zero, last), strict=True)] for last in (soon, late)]
+    if all(end < begin for begin, end in told):
+        raise ValueError(f"--span {span!r}: it ends before it begins")
 
 
 def ephemeris(

@@ -80,7 +80,12 @@ class Case:
     from_: Any = said(None, "DATE", "From when on measurements are new to --prior, where it does not say.", read.instant)
     stations: Any = said(None, "FILE", "Stations: SINEX, TOML, ilrs, mpc; may be repeated.", many=True, usual=True, file=True)
     with_: Any = said(
-        None, "ESTIMATOR", "May be repeated, the first is the answer.  [default: graph]", read.estimators, many=True, usual=True
+        None,
+        "ESTIMATOR",
+        "May be repeated, the first is the answer; window:6h, too.  [default: graph]",
+        read.estimators,
+        many=True,
+        usual=True,
     )
     forces: Any = said(
         "default", "FORCES", 'default, none, or "gravity=EGM2008 degree=40 drag=exponential".  [default: default]', usual=True
@@ -105,9 +110,9 @@ class Case:
         None, "FILE|TEXT", '"2026-11-03T04:12:00Z dv=0,0.3,0m/s axes=RTN sigma=0.05m/s for=600s", or CSV, OPM, OCM.',
         many=True, file=True,
     )  # fmt: skip
-    mass: float | None = said(None, "KG", "Mass of the object.", read.positive, section=("object", "mass"))
-    area: float | None = said(None, "M2", "Cross section of the object.", read.positive, section=("object", "area"))
-    com: float | None = said(None, "M", "From reflectors to the centre of mass.", read.number)
+    mass: float | None = said(None, "KG", "Mass of the object.", read.measure("kg", 0.0), section=("object", "mass"))
+    area: float | None = said(None, "M2", "Cross section of the object.", read.measure("m**2", 0.0), section=("object", "area"))
+    com: float | None = said(None, "M", "From reflectors to the centre of mass.", read.measure("m"))
     epoch: Any = said(None, "DATE", "Where the answer stands.  [default: the last measurement used]", read.instant)
     span: Any = asked(None, "'A .. B'", 'Of products, as "first .. last+3d".', read.span)
     step: float | None = asked(
@@ -178,7 +183,7 @@ class Case:
             if value is None or (isinstance(value, tuple | list) and not value):
                 continue
             if name in ANSWERS:
-                answers[name] = read.number(value, where.format(_key(word))) if name == "interval" else value
+                answers[name] = read.measure("s")(value, where.format(_key(word))) if name == "interval" else value
             else:
                 found[name] = _read(OPTIONS[name], value, where.format(_key(word)))
         return replace(self, answers=answers, **found)

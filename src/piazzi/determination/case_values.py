@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import isfinite
 from typing import Any
 
 from piazzi.text import one_line
+
+_PLAIN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 @contextmanager
@@ -48,6 +51,22 @@ def positive(value: Any, where: str) -> float:
     if found <= 0.0:
         raise ValueError(f"{where} is {one_line(str(value), 60)}; it must be positive")
     return found
+
+
+def measure(unit: str, least: float | None = None) -> Callable[[Any, str], float]:
+    """Makes a reader of numbers in a unit, which may be joined to them; they are above `least`."""
+
+    def read(value: Any, where: str) -> float:
+        from piazzi.determination.words import quantity
+
+        text = str(value).strip()
+        if isinstance(value, str) and not _PLAIN.fullmatch(text):
+            if not text[:1].isdigit() and text[:1] not in "+-.":
+                number(value, where)
+            value = quantity(re.sub(r"m\^?2$", "m**2", text), unit, where)
+        return number(value, where) if least is None else positive(value, where)
+
+    return read
 
 
 def duration(value: Any, where: str) -> float:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.earth import Epoch
+from piazzi.earth.scales import UTC_BEGINS
 from piazzi.formats.conventions import Conventions, with_usual_sigmas
 from piazzi.formats.crd_headers import CORRECTIONS, ONE_WAY, Session
 from piazzi.formats.crd_records import Group, parse
@@ -44,7 +45,10 @@ def read(data: bytes, name: str, told: Conventions) -> Observations:
     of_pass = np.array([g.session for g in laser.groups], dtype=np.int32)
     replaced = superseded(sessions)
     left_out = dict(laser.skipped)
-    epoch = Epoch.from_jd(2400000.5, float(min(session.start[0] for session in sessions)), "UTC")
+    first = float(min(session.start[0] for session in sessions))
+    if first < UTC_BEGINS:
+        raise ValueError(f"{name}: a pass begins on the day {first:.0f} (MJD): there is no UTC before 1960")
+    epoch = Epoch.from_jd(2400000.5, first, "UTC")
     t, weather = np.empty(len(seconds)), np.full((3, len(seconds)), np.nan)
     keep = np.ones(len(seconds), dtype=bool)
     ends = [*laser.first[1:], len(seconds)]

@@ -27,7 +27,7 @@ def fixes_of(ephemeris: Ephemeris, told: Conventions) -> Observations:
     Raises ValueError where there is no state: mean elements are no measurements.
     """
     if not ephemeris.arcs:
-        raise ValueError(f"{ephemeris.file}: the file holds mean elements, which are no measurements; read_ephemeris reads it")
+        raise ValueError(f"{ephemeris.file}: the file holds mean elements, which are no measurements: they can be a --guess")
     rows = concatenate(_fixes(arc, ephemeris.file) for arc in ephemeris.arcs)
     lost = sum(int(np.isnan(arc.position).any(axis=1).sum()) for arc in ephemeris.arcs)
     reasons = {"states without a position": lost, "sets of mean elements": len(ephemeris.mean)}

@@ -143,7 +143,7 @@ def read_ephemeris(path: str | os.PathLike[str], **conventions: Any) -> Ephemeri
     """
     data, form, name = _opened(path)
     if form.ephemeris is None:
-        raise ValueError(f"{name}: the file holds measurements, no orbit; read_tracking reads it")
+        raise ValueError(f"{name}: the file holds measurements, no orbit")
     told = Conventions.of(**conventions)
     found: Ephemeris = _reader(form.ephemeris)(data, name, told)
     if told.frame is None:
