@@ -103,6 +103,27 @@ def test_bad_input_is_one_line_and_leaves_nothing(folder, arguments, says):
     assert not (folder / "out.oem").exists() and done.stdout == ""
 
 
+@pytest.mark.slow
+def test_what_is_not_determined_is_written_only_anyway(folder):
+    """Two fixes with a guess leave a velocity open; one without a guess leaves no orbit: the report and JSON are there."""
+    text = (folder / "one.oem").read_text().splitlines(keepends=True)
+    first = next(i for i, line in enumerate(text) if line.startswith("2015-"))
+    (folder / "few.csv").write_text("# frame = GCRF\ntime[UTC],x[km],y[km],z[km]\n" + ",".join(text[first].split()[:4]) + "\n")
+    known = ["--guess", "last.json", "--sigma", "5m"]
+    assert program(folder, "one.oem", "-o", "last.json").returncode == 0
+    done = program(folder, "few.csv", *known, "-o", "few.oem", "-o", "few.json", "--report", "few")
+    assert done.returncode == 3 and "few.oem is not written: the orbit is not determined (--anyway writes it)" in done.stderr
+    assert not (folder / "few.oem").exists() and (folder / "few" / "report.html").exists()
+    assert json.loads((folder / "few.json").read_text())["determined"] is False
+    assert program(folder, "few.csv", *known, "-o", "few.oem", "--anyway").returncode == 3
+    assert len(pz.read_ephemeris(folder / "few.oem").arcs[0]) == 1
+    done = program(folder, "few.csv", "--sigma", "5m", "-o", "none.oem", "-o", "none.json", "--report", "none")
+    assert done.returncode == 3 and "none.oem is not written: there is no orbit" in done.stderr, done.stderr
+    assert not (folder / "none.oem").exists() and not (folder / "none").exists()
+    facts = json.loads((folder / "none.json").read_text())
+    assert facts["schema"] == "piazzi.determine/1" and facts["determined"] is False and "orbits" in facts
+
+
 def test_help_shows_eight_options(folder):
     short, long = program(folder, "--help").stdout, program(folder, "--help-all").stdout
     for option in ("--guess", "--stations", "--with", "--forces", "--output", "--report", "--json", "--sigma"):

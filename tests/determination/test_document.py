@@ -56,6 +56,78 @@ def test_keys_are_those_of_the_schema_in_their_order(facts):
     assert_allclose(np.sqrt(np.diag(facts["covariance"])), facts["sigma"], rtol=1e-9)
 
 
+NUMBER, NUMBERS = (float, int), [(float, int, type(None))]
+TYPES = {
+    "schema": str, "object": str, "epoch": str, "frame": str, "names": [str], "units": [str], "mean": NUMBERS,
+    "sigma": NUMBERS, "covariance": [NUMBERS], "success": bool, "determined": bool, "message": str, "iterations": int,
+    "seconds": NUMBER, "estimated": [dict], "considered": [dict], "manoeuvres": [dict], "span": dict, "residuals": [dict],
+    "rejected": [dict], "modes": [dict], "verdict": dict, "forces": dict, "left_out": dict, "assumed": [str], "data": [dict],
+}  # fmt: skip
+
+
+def is_of(value, kind):
+    """Whether a value is of a type, or a list of it; a truth value is no number."""
+    if isinstance(kind, list):
+        return isinstance(value, list) and all(is_of(one, kind[0]) for one in value)
+    return isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
+
+
+def check_types(facts):
+    for key, kind in TYPES.items():
+        assert is_of(facts[key], kind), key
+    assert facts["elements"] is None or isinstance(facts["elements"], dict)
+    assert all(is_of(s["ok"], (bool, type(None))) or s["ok"] in (True, False) for s in facts["verdict"].values())
+    assert all(isinstance(s["sentence"], str) and isinstance(s["test"], str) for s in facts["verdict"].values())
+    n = len(facts["names"])
+    assert len(facts["mean"]) == len(facts["sigma"]) == len(facts["units"]) == n
+    assert [len(row) for row in facts["covariance"]] == [n] * n
+
+
+def test_every_value_is_of_the_type_of_the_schema(facts):
+    check_types(facts)
+    for one in facts["rejected"]:
+        assert isinstance(pz.Epoch(one["time"]), pz.Epoch) and is_of(one["residual"], NUMBER) and is_of(one["sigma"], NUMBER)
+    for one in facts["residuals"]:
+        assert all(is_of(one[key], int) for key in ("count", "used")) and all(is_of(one[k], NUMBER) for k in ("mean", "rms"))
+    assert is_of(facts["elements"]["mean"], NUMBERS) and facts["elements"]["kind"] == "keplerian"
+
+
+def test_where_there_is_no_orbit_the_object_has_the_same_keys(facts):
+    from piazzi.determination.document import undetermined
+    from piazzi.determination.initial_result import InitialOrbits, UndeterminedError
+
+    other = json.loads(json.dumps(undetermined(UndeterminedError(InitialOrbits((), 0, 0)), "SAT"), allow_nan=False))
+    assert [key for key in other if key in KEYS] == KEYS
+    check_types(other | {"epoch": facts["epoch"]})
+    assert other["determined"] is False and other["verdict"]["seen"]["ok"] is False and other["orbits"]["schema"]
+    assert [one["ok"] for one in list(other["verdict"].values())[1:]] == [None] * 5
+
+
+def test_other_programs_read_the_products(found, tmp_path):
+    """States and covariances as the packages `oem` and `sgp4` have them; every covariance is positive definite there."""
+    from oem import OrbitEphemerisMessage
+    from sgp4.api import Satrec
+
+    found.write(tmp_path / "a.oem", span="first .. last+1d", step=1800.0)
+    (segment,) = OrbitEphemerisMessage.open(tmp_path / "a.oem").segments
+    covariances = list(segment.covariances)
+    assert len(covariances) == len(list(segment)) > 90
+    for one in covariances:
+        scale = np.sqrt(np.diag(one.matrix))
+        np.linalg.cholesky(one.matrix)
+        assert np.linalg.eigvalsh(one.matrix / np.outer(scale, scale))[0] > 0.0
+    state = list(segment)[5]
+    assert_allclose(1e3 * np.append(state.position, state.velocity), found.orbit.at(EPOCH + 9000.0), rtol=0, atol=1e-5)
+    found.write(tmp_path / "a.tle")
+    one, two = (tmp_path / "a.tle").read_text().splitlines()[-2:]
+    elements = Satrec.twoline2rv(one, two)
+    for t in (0.0, 43200.0, T[-1]):
+        epoch = EPOCH + t
+        failed, r, v = elements.sgp4(*epoch.jd("UTC"))
+        place = earth.transform(1e3 * np.array(r), 1e3 * np.array(v), "TEME", "GCRF", epoch)[0]
+        assert not failed and np.linalg.norm(place - found.orbit.at(epoch)[:3]) < 2e3
+
+
 def test_counts_are_of_all_rows_and_of_those_used(found, facts):
     assert [one["count"] for one in facts["residuals"]] == [len(T)] * 3
     rows = found.residuals

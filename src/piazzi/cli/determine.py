@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -78,7 +79,7 @@ def command(files: tuple[str, ...], **given: Any) -> int:
             result = _one(files, own)
         except UndeterminedError as error:
             status = NOT_ESTIMATED
-            _print_ridge(error, case.json)
+            _print_ridge(error, own)
             continue
         wrote = _write(result, own)
         if own.save is not None:
@@ -110,10 +111,23 @@ def _follow(files: Sequence[str], case: Case) -> int:
     return _status(found, case.strict)
 
 
-def _print_ridge(error: UndeterminedError, as_json: bool) -> None:
-    """What is known of an orbit that cannot be determined."""
-    if as_json:
-        output.print_json(error.orbits.to_dict())
+def _print_ridge(error: UndeterminedError, case: Case) -> None:
+    """What is known of an orbit that cannot be determined: there are no products of it but JSON."""
+    from piazzi.determination.document import undetermined
+
+    facts = undetermined(error, case.object)
+    for path in case.output:
+        target = path.replace("{object}", _file_name(case.object or ""))
+        if Path(target).suffix.lower() == ".json":
+            output.write_json(target, facts)
+        else:
+            say(f"{target} is not written: there is no orbit")
+    if case.report is not None:
+        say(f"{case.report} is not written: there is no orbit")
+        with suppress(OSError):  # a folder that was made for it
+            Path(case.report).rmdir()
+    if case.json:
+        output.print_json(facts)
     else:
         output.print_text(f"not determined: {error}")
 

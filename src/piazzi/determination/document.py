@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination import holding
-from piazzi.determination.guesses import SCHEMA
+from piazzi.determination.guesses import CARTESIAN, SCHEMA
+from piazzi.determination.initial_result import UndeterminedError
 from piazzi.determination.orbit import definite_root, jacobian
 from piazzi.determination.published import beside
 from piazzi.determination.residuals import groups, rejected
+from piazzi.determination.verdict import KEYS
 from piazzi.evaluate.quantities import finite
 from piazzi.orbit import transform_root
 from piazzi.problem import Gaussian
@@ -59,6 +61,28 @@ def document(found: Any) -> dict[str, Any]:
         **({} if found.setup.earlier is None else {"prior": prior(found)}),
         **{key: value for key, value in found.notes.items() if key in ("estimators", "against", "command")},
     }
+
+
+def undetermined(error: UndeterminedError, name: str | None = None) -> dict[str, Any]:
+    """The same object where the measurements determine no orbit: nothing is known but what `orbits` says of it."""
+    orbits = error.orbits.to_dict()
+    said, nothing = str(error), "There is no orbit to ask this of."
+    seen = {
+        "ok": False,
+        "figure": None,
+        "test": "orbits that fit are a ridge",
+        "sentence": f"Not seen: {' '.join(said.split())}.",
+    }
+    other = {"ok": None, "figure": None, "test": "of an orbit that is determined"}
+    return {
+        "schema": SCHEMA, "object": name or "", "epoch": (orbits["ridge"] or {}).get("epoch"), "frame": orbits["frame"],
+        "names": list(CARTESIAN), "units": list(CARTESIAN.values()), "mean": [None] * 6, "sigma": [None] * 6,
+        "covariance": [[None] * 6] * 6, "elements": None, "success": False, "determined": False, "message": said,
+        "iterations": 0, "seconds": 0.0, "estimated": [], "considered": [], "manoeuvres": [],
+        "span": {"first": None, "last": None, "seconds": None}, "residuals": [], "rejected": [], "modes": [],
+        "verdict": {"seen": seen, **{key: {**other, "sentence": f"{key.title()}: {nothing}"} for key in KEYS[1:]}},
+        "forces": {}, "left_out": {}, "assumed": [], "data": [], "about": orbits["about"], "orbits": orbits,
+    }  # fmt: skip
 
 
 def solution(found: Any) -> tuple[Array, Array]:

@@ -104,7 +104,7 @@ def block(found: Any) -> dict[str, object]:
     }  # fmt: skip
     ends = [facts["span"][key] for key in ("first", "last")]
     if None not in ends:
-        first, last = ((found.epoch - Epoch(text)) / 86400.0 for text in ends)
+        first, last = (round((found.epoch - Epoch(text)) / 86400.0, 12) + 0.0 for text in ends)
         out |= {"DAYS_SINCE_FIRST_OBS": first, "DAYS_SINCE_LAST_OBS": last, "ACTUAL_OD_SPAN": first - last}
     out["DATA_TYPES"] = ",".join(dict.fromkeys(printable(one["component"]) for one in facts["residuals"]))
     if found.weighted_rms is not None:
