@@ -36,6 +36,7 @@ from piazzi.present.figures.measured import residuals_of
 from piazzi.present.figures.pages import nearest, orbit_page, pages, save
 from piazzi.present.figures.space import planes
 from piazzi.present.figures.style import COLOURS, MOST_POINTS, colour_of, drawn, line_of
+from piazzi.present.stands import stands
 from piazzi.scenarios import load_scenario
 
 
@@ -71,9 +72,9 @@ def test_orbit_shows_planet_path_truth_and_whole_ellipses(ax, ekf):
     ellipses = [p for p in ax.patches if isinstance(p, Ellipse) and not isinstance(p, Circle)]
     assert len(ellipses) == 9
     assert all(whole(ax, p) for p in (planet, *ellipses))
-    labels = [line.get_label() for line in ax.lines]
-    assert labels[:2] == ["truth", "ekf"]
-    assert_allclose(ax.lines[1].get_xydata(), ekf.mean[:, :2])
+    lines = {line.get_label(): line for line in ax.lines}
+    assert [*lines][:2] == ["ekf", "truth"]
+    assert_allclose(lines["ekf"].get_xydata(), ekf.mean[:, :2])
     assert ax.get_aspect() == 1
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "y [m]")
 
@@ -91,7 +92,7 @@ def test_orbits_are_shown_in_kilometres_when_large(ax, ekf):
     large = replace(ekf, mean=1e6 * ekf.mean, tracking=replace(ekf.tracking, truth=1e6 * ekf.tracking.truth))
     orbit(ax, large)
     assert ax.get_xlabel() == "x [km]"
-    assert_allclose(ax.lines[1].get_xdata(), 1e3 * ekf.mean[:, 0])
+    assert_allclose(ax.lines[0].get_xdata(), 1e3 * ekf.mean[:, 0])
 
 
 def test_a_model_without_positions_has_no_orbit(ax, ekf):
@@ -117,6 +118,79 @@ def test_an_orbit_in_space_is_seen_from_three_sides(ax):
     assert [a.get_ylabel()[0] for a in figure.axes] == ["y", "z", "z", "y"]
     off = {key: np.mean(np.sum((e.mean[2:] - tracking.truth[2:]) ** 2, axis=1)) for key, e in comparison.views.items()}
     assert nearest(comparison)[0] == min(off, key=off.get)
+
+
+def test_stations_are_where_they_stand(ax, ekf):
+    """At the numbers that the sensor takes off the position; others have no place."""
+    orbit(ax, ekf)
+    (mark,) = [line for line in ax.lines if line.get_marker() == "^"]
+    (station,) = ekf.problem.stations
+    assert mark.get_xydata().tolist() == [[station.numbers["mx"], station.numbers["my"]]]
+    assert mark.get_label() == f"station {station.name}"
+
+
+def test_stations_of_the_earth_are_where_they_measured():
+    """On its surface, by a turn of a sidereal day."""
+    scenario = load_scenario("lageos2-laser")
+    tracking = pz.simulate(scenario.problem, scenario.times, np.random.default_rng(0))
+    found = stands(scenario.problem, tracking)
+    assert list(found) == [s.name for s in scenario.problem.stations]
+    index = tracking.stations_of(scenario.problem)
+    for s, place in enumerate(found.values()):
+        t = np.unique(tracking.row_times[index == s])
+        assert len(place) == len(t)
+        assert_allclose(np.linalg.norm(place, axis=1), 6.371e6, rtol=3e-3)
+        turned = np.unwrap(np.arctan2(place[:, 1], place[:, 0]))[-1] - np.arctan2(place[0, 1], place[0, 0])
+        off = np.remainder(turned - 7.2921159e-5 * (t[-1] - t[0]) + np.pi, 2 * np.pi) - np.pi
+        assert abs(off) < 4e-3  # the pole is 1.6e-3 rad from that of the GCRF, times the tangent of the latitude, both ways
+
+
+@pytest.mark.parametrize(
+    ("equations", "there"),
+    [
+        (["hypot(x - a, y - b)"], ["a", "b"]),
+        (["atan2(y - b, x - a)", "(x - a)**2 + (y - b)**2"], ["a", "b"]),
+        (["hypot(x - b, y - a)"], ["b", "a"]),
+        (["hypot(x - a, y - b) + x"], []),
+        (["hypot(x - a, y) + b"], []),
+    ],
+)
+def test_a_place_is_what_positions_are_counted_from(equations, there):
+    sensor = pz.Sensor("s", {f"c{i}": e for i, e in enumerate(equations)})
+    model = pz.Model(["x", "y"], {"x": "0", "y": "0"}, sensor, groups={"position": ["x", "y"]})
+    numbers = {"a": 3.0, "b": 4.0}
+    station = pz.Station("here", "s", [1.0] * len(equations), numbers)
+    problem = pz.Problem(model, pz.Gaussian([9.0, 9.0], [1.0] * 2), [1e-3] * 2, station, prior_time=0.0)
+    found = stands(problem, pz.Tracking([0.0], np.ones((1, len(equations)))))
+    assert [place.tolist() for place in found.values()] == ([[[numbers[n] for n in there]]] if there else [])
+
+
+def test_a_path_is_not_drawn_where_nothing_was_measured_for_long(ax, ekf):
+    """A chord through the planet would be no path."""
+    times = ekf.tracking.times.copy()
+    times[50:] += 1000.0
+    late = replace(ekf, tracking=pz.Tracking(times, ekf.tracking.values, truth=ekf.tracking.truth))
+    orbit(ax, late, name="ekf")
+    for label in ("ekf", "truth"):
+        (line,) = [line for line in ax.lines if line.get_label() == label]
+        assert np.flatnonzero(np.isnan(line.get_xdata())).tolist() == [50]
+
+
+def test_what_is_behind_the_planet_is_dotted(ax):
+    model = pz.Model(
+        ["x", "y", "z"], {"x": "0", "y": "0", "z": "0"}, pz.Sensor("p", ["x", "y", "z"]), groups={"position": ["x", "y", "z"]}
+    )
+    problem = pz.Problem(model, pz.Gaussian([0.0] * 3, [1.0] * 3), [1e-3] * 3, pz.Station("a", "p", [1.0] * 3), prior_time=0.0)
+    turn = np.linspace(0.0, 2 * np.pi, 40, endpoint=False)
+    path = 2.0 * np.column_stack([0 * turn, np.cos(turn), np.sin(turn)])
+    estimate = pz.ExtendedKalmanFilter().estimate(problem, pz.Tracking(turn, path))
+    estimate = replace(estimate, mean=path)
+    for plane, depth in (((0, 1), path[:, 2]), ((0, 2), -path[:, 1]), ((1, 2), path[:, 0])):
+        ax.clear()
+        orbit(ax, estimate, name="ekf", planet_radius=1.0, plane=plane)
+        dotted = [line for line in ax.lines if line.get_linestyle() == ":"]
+        hidden = (np.hypot(*path[:, list(plane)].T) < 1.0) & (depth < 0)
+        assert sum(np.isfinite(line.get_xdata()).sum() for line in dotted) == hidden.sum()
 
 
 def test_last_positions_are_relative_to_the_truth(ax, comparison, ekf):

@@ -157,6 +157,7 @@ def test_the_page_shows_maps_and_spreads(open_page, study_page, grid, stored):
     measure = measures(stored.summary)[2]
     values = map_values(grid, ("R.scale", "lag"), measure, ("window", "delayed"), {})
     assert figure.locator(".cells text").all_text_contents() == [measure.text(v) for v in values.ravel()]
+    figure.scroll_into_view_if_needed()
     box = figure.locator(".plot").bounding_box()
     page.mouse.move(box["x"] + box["width"] - 40, box["y"] + 50)
     assert page.locator("#tip strong").inner_text() == "R.scale = 50, lag = 10"

@@ -22,7 +22,7 @@ from piazzi.present.figures.errors import (
     state_error,
 )
 from piazzi.present.figures.measured import innovations, measurements, passes
-from piazzi.present.figures.space import orbit, planes, position_at, position_columns
+from piazzi.present.figures.space import orbit, path_shape, planes, position_at, position_columns
 from piazzi.present.figures.style import MEASURED, RC, label_of, plain, symmetric_scale
 from piazzi.problem.gaps import in_passes
 
@@ -110,15 +110,20 @@ def orbit_page(comparison: Comparison, planet_radius: float | None = None) -> Fi
     """The orbit with the planet, and where every estimator puts the object at the end."""
     (name, _), estimate = nearest(comparison)
     found_planes = planes(comparison.problem)
-    figure = _figure(10.5, 5.4 if len(found_planes) == 1 else 9.6)
-    axes = figure.subplots(*((1, 2) if len(found_planes) == 1 else (2, 2)), squeeze=False).ravel()
+    if len(found_planes) == 1:
+        figure = _figure(10.5, 5.4)
+        axes = figure.subplots(1, 2, gridspec_kw={"width_ratios": [path_shape(estimate, planet_radius), 1.0]})
+    else:
+        figure = _figure(10.5, 9.6)
+        axes = figure.subplots(2, 2).ravel()
     for ax, plane in zip(axes, found_planes, strict=False):
         orbit(ax, estimate, name=name, planet_radius=planet_radius, plane=plane)
         ax.set_anchor("C")
     axes[0].set_title(f"{'Orbit' if planet_radius else 'Path'} by {label_of(name, estimate.view)}")
     position_at(axes[-1], comparison.views)
     found = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=6)
+    rows = -(-len(found) // 6)
+    figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=-(-len(found) // rows))
     return figure
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.metrics import known_truth
 from piazzi.evaluate.quantities import Display, display_of, unit_of
+from piazzi.present.colours import station_colour
 from piazzi.present.figures.style import PLANET, TRUTH, drawn, label_of, line_of, plain, shade_of
+from piazzi.present.stands import stands
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.patches import Ellipse
 
 SIGMAS = 3.0
+LONG = 5.0  # usual steps of time without an epoch
 MARKS = "osD^vP*X"
 _TURN = np.linspace(0.0, 2 * np.pi, 181)
 UNIT_CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
@@ -46,7 +49,9 @@ def orbit(
     ellipses: int = 9,
     plane: tuple[int, int] | None = None,
 ) -> Axes:
-    """Estimated path and truth in a plane, the planet to scale, and 3-sigma ellipses.
+    """Estimated path and truth in a plane, the planet to scale, the stations, and 3-sigma ellipses.
+
+    Seen from outside: in space, what is behind the planet is dotted.
 
     Parameters
     ----------
@@ -65,10 +70,15 @@ def orbit(
     if planet_radius:
         disc = Circle((0, 0), planet_radius * show.factor, color=PLANET, lw=0, zorder=0.5, label="central body, to scale")
         ax.add_patch(disc)
-    part = drawn(len(path))
-    if truth is not None:
-        ax.plot(*(truth[part][:, [i, j]].T * show.factor), color=TRUTH, lw=2.2, alpha=0.85, label="truth", zorder=2)
-    ax.plot(*(path[part].T * show.factor), **line_of(name, ""), lw=1.2, label=label_of(name, estimate.view), zorder=3)
+    part, cut = drawn(len(path)), _cut(estimate.times)
+    hidden = _behind(estimate, (i, j), planet_radius)
+    for dots, alpha in ((":", 0.5), ("-", 1.0)) if hidden.any() else (("-", 1.0),):
+        seen = cut(np.where((hidden == (dots == ":"))[:, None], path, np.nan)[part])
+        label = label_of(name, estimate.view) if dots == "-" else None
+        ax.plot(*(seen.T * show.factor), **line_of(name, "") | {"linestyle": dots}, lw=1.8, alpha=alpha, label=label, zorder=2)
+    if truth is not None:  # thin, on top: two lines that coincide are both seen
+        ax.plot(*(cut(truth[part][:, [i, j]]).T * show.factor), color=TRUTH, lw=0.8, ls=(0, (4, 3)), label="truth", zorder=3)
+    _stations(ax, estimate, (i, j), show)
     reference = path if truth is None else truth[:, [i, j]]
     extent = _extent(reference, planet_radius) * show.factor
     drawn_ellipses = _ellipses(estimate, (i, j), show, ellipses, largest=float(np.max(extent[1] - extent[0])))
@@ -79,6 +89,42 @@ def orbit(
         ax.add_patch(patch)
     _frame(ax, extent, drawn_ellipses)
     return _labelled(ax, estimate.problem, (i, j), show)
+
+
+def _cut(times: Array) -> Callable[[Array], Array]:
+    """What leaves a gap in a path where there were no epochs for long, as between passes: a chord would be no path."""
+    steps = np.diff(times[drawn(len(times))])
+    ends: Array = np.flatnonzero(steps > LONG * np.median(steps)) + 1 if len(steps) else np.array([], dtype=int)
+
+    def cut(path: Array) -> Array:
+        return np.insert(path, ends, np.nan, axis=0)
+
+    return cut
+
+
+def _behind(estimate: Estimate, plane: tuple[int, int], radius: float | None) -> Array:
+    """Which epochs are behind the planet, seen in a plane with its two axes to the right and up."""
+    found = estimate.problem.model.group_indices.get("position", ())[:3]
+    if not radius or len(found) < 3:
+        return np.zeros(len(estimate.mean), dtype=bool)
+    (third,) = {*found} - {*plane}
+    towards = -1.0 if plane == (found[0], found[2]) else 1.0  # the axes are right-handed
+    across, deep = np.hypot(*estimate.mean[:, list(plane)].T), towards * estimate.mean[:, third]
+    return np.asarray((across < radius) & (deep < 0.0))
+
+
+def _stations(ax: Axes, estimate: Estimate, plane: tuple[int, int], show: Display) -> None:
+    """Stations where they stand; those that turn with the Earth where they measured."""
+    found = stands(estimate.problem, estimate.tracking)
+    at = [estimate.problem.model.group_indices["position"].index(c) for c in plane]
+    for n, (name, place) in enumerate(found.items()):
+        x, y = place[:, at].T * show.factor
+        label = f"{'stations' if len(found) > 1 else f'station {plain(name)}'}{', where they measured' if len(x) > 1 else ''}"
+        style: dict[str, Any] = {"color": station_colour(n), "zorder": 4, "label": label if not n else None}
+        if len(x) == 1:
+            ax.plot(x, y, "^", ms=7, mec="white", mew=0.8, **style)
+        else:
+            ax.plot(x, y, ".", ms=3, **style)
 
 
 def path_beside_truth(ax: Axes, path: Array, truth: Array, *, name: str = "estimate", unit: str = "m") -> Axes:
@@ -162,6 +208,14 @@ def _extent(path: Array, planet_radius: float | None) -> Array:
     corners = np.quantile(good, [0.005, 0.995], axis=0) if len(good) else np.array([[-1.0, -1.0], [1.0, 1.0]])
     radius = planet_radius or 0.0
     return np.array([np.minimum(corners[0], -radius), np.maximum(corners[1], radius)]) if radius else corners
+
+
+def path_shape(estimate: Estimate, planet_radius: float | None) -> float:
+    """Width of a path in its plane over its height, no more than a factor of 2.5 either way."""
+    columns, truth = list(_columns(estimate.problem)), known_truth(estimate)
+    low, high = _extent((estimate.mean if truth is None else truth)[:, columns], planet_radius)
+    wide, tall = np.maximum(high - low, 1e-12)
+    return float(np.clip(wide / tall, 0.4, 2.5))
 
 
 def _ellipses(estimate: Estimate, columns: tuple[int, int], show: Display, count: int, largest: float) -> list[Ellipse]:

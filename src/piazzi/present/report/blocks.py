@@ -111,7 +111,10 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """An animated path about a planet; with `close` errors about the origin, scaled anew at every epoch."""
+    """An animated path about a planet; with `close` errors about the origin, scaled anew at every epoch.
+
+    `sites` are stations: name, colour, and where they stand, or stood when they measured.
+    """
 
     title: str
     tracks: Sequence[Track]
@@ -121,6 +124,7 @@ class Orbit:
     planet_radius: float | None = None
     close: bool = False
     note: str = ""
+    sites: Sequence[tuple[str, str, Array, Array]] = ()
 
 
 @dataclass(frozen=True)

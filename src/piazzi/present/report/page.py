@@ -240,6 +240,10 @@ class _Builder:
             "limits": list(orbit.limits),
             "planet": orbit.planet_radius,
             "tracks": [self._track(track) for track in orbit.tracks],
+            "sites": [
+                {"label": printable(label), "colour": colour, "x": self.pool.add(x), "y": self.pool.add(y)}
+                for label, colour, x, y in orbit.sites
+            ],
         }
 
     def _track(self, track: Track) -> dict[str, Any]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from piazzi.evaluate.quantities import display_of, unit_of
+from piazzi.present.colours import station_colour
 from piazzi.present.figures.space import position_columns
 from piazzi.present.report.blocks import Orbit, Track
 from piazzi.present.report.panels import sigmas_of
 from piazzi.present.report.views import Views
+from piazzi.present.stands import stands
 from piazzi.problem.checks import Array
 
 
@@ -47,9 +49,16 @@ def _plane(views: Views, columns: tuple[int, int], planet_radius: float | None, 
     about = "truth" if views.truth is not None else views.keys[0].label
     plane = f", {names[0]} and {names[1]}" if named else ""
     labels = (f"{names[0]} - {about}", f"{names[1]} - {about}")
+    position = model.group_indices["position"]
+    stood = stands(views.comparison.problem, views.comparison.tracking)
+    sites = [
+        (name, station_colour(n), place[:, position.index(i)], place[:, position.index(j)])
+        for n, (name, place) in enumerate(stood.items())
+    ]
+    path = f"{'Orbit' if planet_radius else 'Path'}{plane}"
     title = f"Close-up about {'the truth' if views.truth is not None else about}{plane}"
     return [
-        Orbit(f"{'Orbit' if planet_radius else 'Path'}{plane}", far, names, show, limits, planet_radius, note=_left_out(views)),
+        Orbit(path, far, names, show, limits, planet_radius, note=_left_out(views), sites=sites),
         Orbit(title, near, labels, close, close=True),
     ]
 

@@ -54,7 +54,7 @@ function withUnit(text, unit) {
 }
 
 function element(name, attributes = {}, ...children) {
-  const svg = ["svg", "g", "path", "line", "circle", "ellipse", "text", "rect", "clipPath", "defs"].includes(name);
+  const svg = ["svg", "g", "path", "line", "circle", "ellipse", "text", "rect", "clipPath", "defs", "title"].includes(name);
   const out = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) out.setAttribute(key, value);
   for (const child of children) out.append(child);

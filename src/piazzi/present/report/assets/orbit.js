@@ -15,6 +15,9 @@ class Orbit {
       colour: t.key >= 0 ? tab.keys[t.key].colour : "var(--ink)",
       dash: t.key >= 0 ? tab.keys[t.key].dash.join(" ") : "",
     }));
+    const steps = Array.from(tab.times.slice(1), (t, i) => t - tab.times[i]);
+    const usual = [...steps].sort((p, q) => p - q)[steps.length >> 1];
+    this.breaks = new Set(steps.flatMap((step, i) => (step > 5 * usual ? [i + 1] : []))); // between passes a chord would be no path
     box.addEventListener("pointermove", (event) => this.hover(event));
     box.addEventListener("pointerleave", hideTip);
   }
@@ -75,17 +78,28 @@ class Orbit {
     const f = this.spec.show[1];
     if (this.spec.planet) {
       this.still.prepend(element("circle", { cx: this.px(0), cy: this.py(0), r: this.spec.planet * f * this.unit, class: "planet" }));
-      const wide = this.spec.planet * f * this.unit > 24;
-      if (wide) this.still.append(element("text", { x: this.px(0), y: this.py(0) + 4, "text-anchor": "middle", class: "on-planet" }, "planet"));
+      const wide = this.spec.planet * f * this.unit > 44;
+      if (wide) this.still.append(element("text", { x: this.px(0), y: this.py(0) + 4, "text-anchor": "middle", class: "on-planet" }, "central body"));
     }
     for (const track of this.tracks) {
       track.points = Array.from(track.x, (x, i) => {
         const far = (v) => Math.min(Math.max(v, -2000), 4000).toFixed(1);
         return Number.isNaN(x) || Number.isNaN(track.y[i]) ? "" : `${far(this.px(x))} ${far(this.py(track.y[i]))}`;
       });
-      track.whole.setAttribute("d", joined(track.points));
+      track.whole.setAttribute("d", joined(track.points, this.breaks));
     }
+    for (const site of this.spec.sites) this.still.append(this.site(site));
     this.axes();
+  }
+
+  // A station that stands still is a triangle with its name, one that turns with the Earth dots where it measured.
+  site({ label, colour, x, y }) {
+    const f = this.spec.show[1];
+    const [xs, ys] = [array(x), array(y)].map((values, i) => Array.from(values, (v) => (i ? this.py(v * f) : this.px(v * f))));
+    const title = element("title", {}, `station ${label}`);
+    if (xs.length > 1) return element("path", { d: Array.from(xs, (at, i) => `M${at.toFixed(1)} ${ys[i].toFixed(1)}h0`).join(""), stroke: colour, class: "dots" }, title);
+    const mark = element("path", { d: `M${xs[0]} ${ys[0] - 6}l6 10h-12z`, fill: colour, class: "site" }, title);
+    return element("g", {}, mark, element("text", { x: xs[0] + 9, y: ys[0] + 4, class: "reference" }, label));
   }
 
   axes() {
@@ -134,7 +148,7 @@ class Orbit {
     const [x, y] = [track.x[k], track.y[k]];
     const there = Number.isFinite(x) && Number.isFinite(y);
     track.dot.setAttribute("visibility", there ? "visible" : "hidden");
-    if (track.trail) track.trail.setAttribute("d", joined(track.points.slice(0, k + 1)));
+    if (track.trail) track.trail.setAttribute("d", joined(track.points.slice(0, k + 1), this.breaks));
     const oval = there && track.sx ? ellipseOf(track.sx[k], track.sy[k], track.rho[k]) : null;
     track.ellipse.setAttribute("visibility", oval ? "visible" : "hidden");
     if (!there) return;
@@ -195,15 +209,14 @@ function ellipseOf(sx, sy, rho) {
   return { a: 3 * Math.sqrt(large), b: 3 * Math.sqrt(small), angle: 0.5 * Math.atan2(2 * c, a - b) };
 }
 
-function joined(points) {
+function joined(points, breaks) {
   let out = "";
   let pen = "M";
-  for (const point of points) {
-    if (point === "") pen = "M";
-    else {
-      out += pen + point;
-      pen = "L";
-    }
-  }
+  points.forEach((point, i) => {
+    if (point === "" || breaks.has(i)) pen = "M";
+    if (point === "") return;
+    out += pen + point;
+    pen = "L";
+  });
   return out;
 }
