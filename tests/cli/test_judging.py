@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi import earth
 from piazzi.cli.additions import additions
 
 SCENARIO = "b612-range-q0"
@@ -85,6 +86,80 @@ def test_additions_are_read():
     assert (again.name, again.sensor, dict(again.numbers)) == ("added radar", "range", {"mx": 10, "my": 0})
     assert (sensor.width, two.noise.tolist(), dict(two.numbers)) == (2, [1, 4], {"q": 3})
     assert [s.name for s in additions(problem, ("radar", "radar"))] == ["added radar", "added radar 2"]
+
+
+ORBIT = """
+epoch = "2024-01-01T00:00:00 UTC"
+[earth]
+degree = 4
+[sensors.range]
+kind = "range"
+visible = ["above"]
+numbers = { mask = "10 deg" }
+[[stations]]
+name = "S"
+sensor = "range"
+site = { latitude = 35.0, longitude = 20.0, height = 100.0 }
+noise = { sigma = 1.0 }
+[prior]
+a = "7078 km"
+e = 0.001
+i = "98.2 deg"
+raan = "110 deg"
+argp = "90 deg"
+nu = "10 deg"
+sigma = [100.0, 300.0, 100.0, 0.3, 0.1, 0.1]
+axes = "RTN"
+[times]
+start = 0.0
+step = 60.0
+count = 900
+"""
+
+
+@pytest.fixture
+def orbit(tmp_path):
+    path = tmp_path / "orbit.toml"
+    path.write_text(ORBIT)
+    return path
+
+
+def test_additions_on_the_earth_are_read(orbit):
+    problem = pz.scenarios.load_scenario(orbit).problem
+    texts = "S", "range:site=7090,sigma=0.1,mask=0.3", "range:latitude=48deg,longitude=11deg,height=0.5km,sigma=0.1"
+    again, laser, mast = additions(problem, texts)
+    assert again.place == problem.stations[0].place
+    assert again.numbers["mask"] == pytest.approx(np.radians(10.0))
+    assert (laser.place.station.name, laser.numbers["mask"]) == ("7090", 0.3)
+    expected = earth.geodetic_to_position(np.radians(48.0), np.radians(11.0), 500.0)
+    assert np.allclose(mast.place.station.position(problem.epoch), expected, atol=1e-6)
+    assert mast.numbers["latitude"] == pytest.approx(np.radians(48.0))
+    assert mast.numbers["mask"] == pytest.approx(np.radians(10.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("range:sigma=1", "give site=NAME of the ILRS, or latitude=, longitude= and height="),
+        ("range:latitude=48deg,sigma=1", "give site=NAME of the ILRS, or latitude=, longitude= and height="),
+        ("range:site=709,sigma=1", "no site of the ILRS is called '709'; did you mean '7109'?"),
+        ("range:latitude=48m,longitude=1deg,height=0m,sigma=1", "must be in a unit such as deg"),
+    ],
+)
+def test_what_is_wrong_with_an_addition_on_the_earth(call, orbit, text, message):
+    assert message in call("observability", orbit, "--add", text).refused()
+
+
+@pytest.mark.slow  # the kernels of an orbit
+def test_an_added_station_measures_by_its_own_rule_at_all_times(call, orbit):
+    """The same place once more halves the variance; at the other side of the Earth it sees at times when nobody else does."""
+    document = call("observability", orbit, "--no-twins", "--json", "--add", "S").document
+    ratio = np.array(document["added"]["singular_values"]) / np.array(document["singular_values"])
+    assert np.allclose(ratio, np.sqrt(2), rtol=1e-6)
+    elsewhere = call("observability", orbit, "--no-twins", "--json", "--add", "range:site=7090,sigma=1").document
+    assert elsewhere["added"]["crlb_sigma"][0] < 0.7 * elsewhere["crlb_sigma"][0]
+    hidden = call("observability", orbit, "--no-twins", "--json", "--add", "range:site=7090,sigma=1,mask=1.57").document
+    assert np.allclose(hidden["added"]["crlb_sigma"], hidden["crlb_sigma"], rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -116,6 +116,13 @@ def test_what_is_wrong_is_said_with_its_place(tmp_path, old, new, said):
     assert any(said in fault for fault in faults) if said else not faults
 
 
+@pytest.mark.parametrize(("height", "said"), [("-100 km", "inside the Earth; is that meant"), ("500 km", "above any mountain")])
+def test_unlikely_places_are_asked_about_and_not_refused(tmp_path, height, said):
+    site = f'site = {{ latitude = 10.0, longitude = 20.0, height = "{height}" }}'
+    with pytest.warns(earth.StationWarning, match=said):
+        load_scenario(written(tmp_path, TEXT.replace('site = "7840"', site, 1)))
+
+
 def test_a_check_at_the_door_takes_the_state_nearby_to_second_order():
     sensor = pz.Sensor("late", {"there": "there"}, definitions={"there, speed": "at(-2, order=2)"})
     model = pz.Model(["x", "v"], {"x": "v", "v": "-9.81"}, sensor)

@@ -49,17 +49,22 @@ def command(
       piazzi observability b612-range-q0 --add range:mx=-10,my=0,sigma=0.1
       piazzi observability b612-range-q0 --add "b=atan2(y, x):sigma=0.01,angle"
       piazzi observability network.toml --add radar --json
+      piazzi observability lageos2-laser --add range:site=7839,sigma=0.02
     """
     outputs = results.Outputs(output_file, as_json, report)
     outputs.check()
     from piazzi.cli.additions import additions
-    from piazzi.cli.sources import load_source
+    from piazzi.cli.sources import STDIN, load_source
     from piazzi.evaluate.observing import observability
+    from piazzi.scenarios import load_scenario
 
     source_found = load_source(source, seed, scenario, recording)
     problem, tracking = source_found.problem, source_found.tracking
     add = additions(problem, added)
-    found = observability(problem, tracking, add=add, twins=not no_twins, source=source_found.name)
+    anew: dict[str, Any] = {}
+    if add and not source_found.recorded and source != STDIN:
+        anew = {"times": load_scenario(source).times, "seed": seed}
+    found = observability(problem, tracking, add=add, twins=not no_twins, source=source_found.name, **anew)
 
     def tab() -> Tab:
         from piazzi.present.report import observability_tab

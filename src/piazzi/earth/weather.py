@@ -32,6 +32,7 @@ standard_atmosphere = Formula(
     ("pressure", "temperature", "humidity"),
     "US Standard Atmosphere 1976 to 11 km; humidity as in Berg 1948",
 )
+GROUND = -1000.0, 9000.0  # m, where stations may stand
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,11 @@ class Weather:
 
     @classmethod
     def standard(cls, height: float) -> Weather:
-        """Standard weather at a height (m): 1013.25 hPa, 15 degrees Celsius and half of saturation at the sea."""
-        return cls(*(float(value) for value in standard_atmosphere(height)))
+        """Standard weather at a height (m): 1013.25 hPa, 15 degrees Celsius and half of saturation at the sea.
+
+        Of places below all ground or above it, that of the lowest or the highest: whether they are meant is asked elsewhere.
+        """
+        return cls(*(float(value) for value in standard_atmosphere(min(max(height, GROUND[0]), GROUND[1]))))
 
     @property
     def vapour(self) -> float:

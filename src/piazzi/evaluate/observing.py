@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from piazzi.model import Sensor
 from piazzi.problem import Problem, ProcessNoise, Station, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import Inputs, prepare
-from piazzi.simulation import seen, true_problem
+from piazzi.simulation import seen, simulate, true_problem
 
 Addition = Station | tuple[Sensor, Station]
 _POINTS = 400  # epochs after which the growing information is kept
@@ -30,6 +31,8 @@ def observability(
     add: Sequence[Addition] = (),
     twins: bool = True,
     source: str = "",
+    times: Any = None,
+    seed: int = 0,
 ) -> Observability:
     """What the measurements say about the first state, at the truth (where it is not known, at the factor graph's estimate).
 
@@ -45,6 +48,8 @@ def observability(
         `Observability.added` tells what they would change.
     twins : whether to look for other first states with the same measurements
     source : where the measurements came from, for the record
+    times, seed : of the simulation that the tracking is, where the added stations may measure at other epochs than those
+        it has, by their own rules and schedules: all are simulated anew
 
     Raises
     ------
@@ -59,7 +64,11 @@ def observability(
     found = replace(found, attempts=attempts(problem, tracking, found.twins), message=message)
     if more is None:
         return found
-    wider = _with_rows(tracking, problem, more, states)
+    if times is None:
+        wider = _with_rows(tracking, problem, more, states)
+    else:
+        wider = simulate(more, times, np.random.default_rng(seed))
+        states = _about(more, wider)[0]
     return replace(found, added=_observability(more, wider, prepare(more, wider), states, about, twins, source))
 
 

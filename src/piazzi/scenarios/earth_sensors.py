@@ -120,10 +120,13 @@ def _site(table: Table) -> Any:
     """The station that ``site`` is: a name of the ILRS, or a table as in a file of stations."""
     from piazzi.earth import ilrs_stations
     from piazzi.earth.station_files import station_of
+    from piazzi.earth.stations import warn_of_place
 
     site = table.raw("site")
     if isinstance(site, Mapping):
-        return station_of({"name": table.text("name") or "station", **site}, table.at("site"))
+        station = station_of({"name": table.text("name") or "station", **site}, table.at("site"))
+        warn_of_place(station, table.at("site"))
+        return station
     known = ilrs_stations()
     if not isinstance(site, str) or site not in known:
         hint = nearest(str(site)[:60], list(known))

@@ -113,7 +113,7 @@ class Instrument(Sensor):
             if station is None or epoch is None:
                 raise ValueError(f"sensor {self.name!r} needs a station and the epoch of the problem")
             place = Place(station, Epoch(epoch), eop, tides)
-            local = self._local(station, Epoch(epoch), weather)
+            local = local_numbers(station, Epoch(epoch), weather, self.mapping)
         if station is not None:
             local |= {f"{kind}_bias": value for kind, value in station.bias.items()} | {"mask": station.mask}
         mine = {plain(called), plain(station.name) if station else ""}
@@ -121,16 +121,6 @@ class Instrument(Sensor):
         noise = self._noise(called, sigma, covariance, station)
         values = known | {key: value for key, value in local.items() if key in known} | chosen | numbers
         return {"name": called, "sensor": self.name, "noise": noise, "numbers": values, "place": place}
-
-    def _local(self, station: Station, epoch: Epoch, weather: Weather | None) -> dict[str, float]:
-        """Numbers that follow from where the station is, and from the weather there."""
-        latitude, longitude, height = station.place(epoch)
-        air = weather or Weather.standard(height)
-        found = {"latitude": latitude, "longitude": longitude, "height": height}
-        found |= {"pressure": air.pressure, "temperature": air.temperature, "vapour": air.vapour}
-        if self.mapping == "gmf":
-            return found | troposphere.gmf_coefficients(latitude, longitude, epoch)
-        return found | troposphere.niell_coefficients(latitude, epoch)
 
     def _noise(self, name: str, sigma: Any, covariance: Any, station: Station | None) -> Any:
         if covariance is not None:
@@ -141,6 +131,17 @@ class Instrument(Sensor):
         if sigma is None:
             raise ValueError(f"station {name!r} has no standard deviations of {', '.join(self.components)}: give sigma=")
         return np.broadcast_to(np.asarray(sigma, dtype=float), self.width) ** 2
+
+
+def local_numbers(station: Station, epoch: Epoch, weather: Weather | None = None, mapping: str = "niell") -> dict[str, float]:
+    """Numbers that follow from where a station is, and from the weather there, of whatever sensor."""
+    latitude, longitude, height = station.place(epoch)
+    air = weather or Weather.standard(height)
+    found = {"latitude": latitude, "longitude": longitude, "height": height}
+    found |= {"pressure": air.pressure, "temperature": air.temperature, "vapour": air.vapour}
+    if mapping == "gmf":
+        return found | troposphere.gmf_coefficients(latitude, longitude, epoch)
+    return found | troposphere.niell_coefficients(latitude, epoch)
 
 
 def plain(name: str) -> str:
