@@ -21,7 +21,7 @@ unexport PYTHONPATH PYTHONHOME
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help demo docs wheel test test-slow test-all lint format bench constraints clean distclean
+.PHONY: help demo docs docs-site wheel test test-slow test-all lint format bench constraints clean distclean
 
 help: ## list what can be made
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
@@ -34,6 +34,9 @@ docs: .venv/.docs .venv/.package ## build the documentation into build/docs, wit
 	@PIAZZI_CACHE="$${PIAZZI_CACHE:-$(CURDIR)/.cache/tests}" $(BIN)/sphinx-build --quiet --fail-on-warning --fresh-env \
 		--jobs auto --doctree-dir .cache/doctrees docs build/docs
 	@echo "Open build/docs/index.html"
+
+docs-site: docs ## put build/docs into build/site, beside the versions that are there already
+	@$(BIN)/python docs/machinery/versions.py build/docs build/site
 
 wheel: .venv/.runtime ## build dist/piazzi-*.whl, for pip install
 	@rm -rf dist && $(BIN)/python -m pip --quiet --quiet --no-input --disable-pip-version-check wheel --no-build-isolation --no-deps --wheel-dir dist .

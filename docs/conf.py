@@ -2,6 +2,7 @@
 
 import os
 import sys
+import tomllib
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -12,6 +13,7 @@ project = "Piazzi"
 author = "Piazzi contributors"
 project_copyright = author
 language = "en_GB"
+version = release = tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml", "made", "links", "reference"]
 source_suffix = {".md": "markdown"}
@@ -21,6 +23,7 @@ nitpicky = False
 
 myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3
+myst_html_meta = {"version": version}  # which machinery/versions.py puts beside others
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
@@ -32,7 +35,7 @@ python_use_unqualified_type_names = True
 add_module_names = False
 
 html_theme = "furo"
-html_title = "Piazzi"
+html_title = f"Piazzi {version}"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False

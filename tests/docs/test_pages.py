@@ -48,6 +48,11 @@ def test_every_page_of_the_gallery_has_its_picture_its_notebook_and_a_place_in_t
         assert f"(gallery/{page.stem}.md)" in index and f"\ngallery/{page.stem}\n" in index
 
 
+def test_what_contributors_follow_is_run():
+    table = re.findall(r"^\| an? .*\]\(([^)]+\.md)\)", (DOCS.parent / "CONTRIBUTING.md").read_text(), re.MULTILINE)
+    assert len(table) == 6 and {DOCS.parent / page for page in table} <= set(PAGES)
+
+
 def test_the_tutorials_and_guides_are_among_them():
     assert {"bearing-only", "range-only", "own-problem", "founding-texts"} <= {p.stem for p in PAGES}
 
