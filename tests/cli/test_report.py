@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 
 def test_compare_writes_a_report_beside_its_json(call, tmp_path):
     found = call("compare", "b612-range", "--with", "ekf", "--json", "--report", tmp_path / "new" / "folder")
@@ -72,3 +74,21 @@ def test_a_page_says_how_it_was_made(call, tmp_path):
     assert "Seed 4." in text and "# &lt;b&gt;mine&lt;/b&gt; &amp; nobody else&#x27;s" in text
     assert text.count("<h3>How it was made</h3>") == 2
     assert text.count("<pre") == 4  # the command and the scenario, twice
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["compare", "b612-range", "--with", "ekf"],
+        ["windows", "b612-range", "--lags", "5,10", "--no-graph"],
+        ["observability", "b612-range", "--no-twins"],
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_a_page_has_the_title_that_it_is_given(call, tmp_path, arguments):
+    path = tmp_path / "page.html"
+    found = call(*arguments, "--title", "Mine & <yours>", "--report", path)
+    assert found.status == 0, found.err
+    text = path.read_text()
+    assert "<title>Mine &amp; &lt;yours&gt;</title>" in text
+    assert "<h2>Mine &amp; &lt;yours&gt;</h2>" in text

@@ -9,6 +9,7 @@ import pytest
 
 import piazzi as pz
 from piazzi import earth
+from piazzi.determination.holding import passes
 from piazzi.determination.page.charts import gained, passes_of
 from piazzi.determination.page.places import station_rows
 from piazzi.determination.page.sampled import sampled
@@ -98,7 +99,14 @@ def test_rejected_rows_have_their_reason(found):
     (rows,) = station_rows(found, sampled(found))
     assert np.nansum(rows.used == 0) == 1
     assert rows.notes[7] == found.reasons[7] != ""
-    assert passes_of(table(found), 1800.0)[0][0] == "fixes"
+
+
+def test_passes_of_the_page_are_those_of_the_verdict(found):
+    every = passes(found.setup, np.ones(len(found.setup.rows), dtype=bool))
+    shown = passes_of(found, table(found))
+    row = np.nonzero(found.setup.rows >= 0)[0]
+    assert shown[0][0] == "fixes"
+    assert [np.unique(row[entries]).tolist() for _, entries in shown] == [one.tolist() for one in every]
 
 
 def test_an_orbit_that_is_not_finite_is_not_drawn(found):

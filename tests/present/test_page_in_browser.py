@@ -10,10 +10,11 @@ import piazzi as pz
 from piazzi.estimate.registry import parse
 from piazzi.evaluate import Comparison, compare
 from piazzi.evaluate.observing import observability
-from piazzi.evaluate.quantities import number
+from piazzi.evaluate.quantities import Display, number
 from piazzi.evaluate.window_lengths import windows
 from piazzi.present.colours import shade_of
 from piazzi.present.report import comparison_tab, observability_tab, windows_tab, write_page
+from piazzi.present.report.blocks import Key, Orbit, Section, Tab, Track
 from piazzi.scenarios import load_scenario
 
 HOSTILE = "</script><script>hacked=1</script><img src=x onerror=hacked=1>\u2028\u202e&lt;'\"<!--"
@@ -358,3 +359,32 @@ def test_windows_of_near_lengths_have_looks_of_their_own(open_page, comparison, 
     marks = open_page(write_page(tmp_path / "w.html", "W", [comparison_tab(found)])).locator("#t0 .chip svg line").all()
     dashes = [mark.get_attribute("stroke-dasharray") for mark in marks]
     assert len(set(dashes)) == len(dashes) == 8
+
+
+@pytest.mark.parametrize("close", [False, True])
+def test_right_ascension_grows_to_the_left_as_on_the_sky(open_page, tmp_path, close):
+    """To scale with declination; the ellipse of a positive correlation leans to the upper left."""
+    times, sigma, zero = np.arange(5.0), np.full(5, 0.1), np.zeros(5)
+    x, y = (zero, zero) if close else (np.arange(5.0), np.arange(5.0))
+    track = Track(x, y, "object", 0, sigma, sigma, np.full(5, 0.9))
+    limits = (0.0, 4.0, 0.0, 4.0)
+    block = Orbit("Sky", [track], ("right ascension", "declination"), Display("deg"), limits, close=close, mirrored=True)
+    tab = Tab("Sky", "", [], [Section("Sky", [block])], keys=[Key("object", "#0072B2")], times=times, show_time=Display("s"))
+    page = open_page(write_page(tmp_path, "Sky", [tab]))
+    places = []
+    for k in (0, 4):
+        page.locator("input.time").fill(str(k))
+        dot = page.locator("circle.dot")
+        places.append([float(dot.get_attribute(name)) for name in ("cx", "cy")])
+    (x0, y0), (x1, y1) = places
+    if not close:
+        assert x1 < x0
+        assert y1 < y0
+        assert x0 - x1 == pytest.approx(y0 - y1)
+    turn = float(page.locator("ellipse").get_attribute("transform").split("(")[1].split()[0])
+    assert turn == pytest.approx(45.0)  # clockwise on the screen, of an ellipse whose long axis is level at first
+    marks = [
+        (float(mark.get_attribute("x")), float(mark.text_content().replace("\N{MINUS SIGN}", "-")))
+        for mark in page.locator(".grid-lines text[text-anchor=middle]").all()
+    ]
+    assert [value for _, value in sorted(marks)] == sorted((value for _, value in marks), reverse=True)

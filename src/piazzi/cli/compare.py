@@ -26,6 +26,7 @@ DEFAULT = ("ekf", "graph", "window:100")
 @options.scenario
 @recording_options
 @results.report_option
+@results.title_option
 def command(
     source: str,
     names: tuple[str, ...],

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from piazzi.cli import options, output
+from piazzi.cli import options, output, results
 from piazzi.cli.running import DONE
 
 PICTURES = (".png", ".pdf", ".svg")
@@ -26,6 +26,7 @@ TRUTHS = (".toml", ".npz", ".nc")
 @click.option("--degree", metavar="N", type=options.WholeNumber(1), help="Of the polynomial between rows.  [default: chosen]")
 @options.seed
 @options.output("Draw the difference over time, as .png, .pdf or .svg.")
+@results.title_option
 @options.as_json
 def command(
     first: str,
@@ -62,7 +63,7 @@ def command(
         from piazzi.present.figures.difference import difference_page
         from piazzi.present.figures.pages import save
 
-        wrote.append(f"Wrote {save(difference_page(found), output_file)}")
+        wrote.append(f"Wrote {save(difference_page(found, results.given_title() or ''), output_file)}")
     if as_json:
         output.print_json(found.to_dict())
         return DONE

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 @options.scenario
 @recording_options
 @results.report_option
+@results.title_option
 def command(
     source: str,
     added: tuple[str, ...],

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 ENDINGS = (".json", ".csv")
 PAGES = (".html", ".htm")
+_TITLE = "piazzi.title"
 
 
 class Result(Protocol):
@@ -97,13 +98,18 @@ def report_option(function: F) -> F:
 
 def title_option(function: F) -> F:
     """Option --title, of the page and the pictures."""
-    return click.option("--title", metavar="TEXT", expose_value=True, help="Title of the page and the pictures.")(function)
+    kept: dict[str, Any] = {"expose_value": False, "callback": _keep_title}
+    return click.option("--title", metavar="TEXT", help="Title of the page, or of pictures.", **kept)(function)
+
+
+def _keep_title(context: click.Context, parameter: click.Parameter, value: str | None) -> None:
+    context.meta[_TITLE] = value
 
 
 def given_title() -> str | None:
     """What --title says, None where it says nothing."""
-    title = _parameters().get("title")
-    return str(title) if title else None
+    context = click.get_current_context(silent=True)
+    return (context.meta.get(_TITLE) if context is not None else None) or None
 
 
 def check_report(path: str | None) -> None:
@@ -120,15 +126,18 @@ def check_report(path: str | None) -> None:
 
 
 def title_and_planet(source: str, name: str, scenario: str | None) -> tuple[str, float | None]:
-    """Title of a problem and radius of its planet, as its scenario says; `name` and None where there is none."""
+    """Title of a problem and radius of its planet, as its scenario says; `name` and None where there is none.
+
+    The title is that of --title where it is given.
+    """
     from piazzi.scenarios import load_scenario
 
     text = scenario or source
     try:  # the founding layout is that problem
         found = load_scenario("satellite-bearing" if text.lower().endswith(".npz") else text)
     except (ValueError, OSError):
-        return name, None
-    return found.title or name, found.picture.planet_radius
+        return given_title() or name, None
+    return given_title() or found.title or name, found.picture.planet_radius
 
 
 def write_page(path: str, tabs: Sequence[Tab], title: str | None = None) -> Path:

@@ -50,7 +50,6 @@ def command(
     chunk: int | None,
     figures: str | None,
     report: str | None,
-    title: str | None,
     as_json: bool,
     seed: int,
 ) -> int:
@@ -90,11 +89,11 @@ def command(
         if figures is not None:
             from piazzi.present.figures.studies import write_figures
 
-            wrote += [f"Wrote {file}" for file in write_figures(figures, summary, title or "")]
+            wrote += [f"Wrote {file}" for file in write_figures(figures, summary, results.given_title() or "")]
         if report is not None:
             from piazzi.present.report import study_tabs
 
-            title = title or results.title_and_planet(scenario, study.name, None)[0]
+            title = results.title_and_planet(scenario, study.name, None)[0]
             wrote.append(f"Wrote {results.write_page(report, study_tabs(summary, title), f'Piazzi report: {title}')}")
         if as_json:
             output.print_json(summary.to_dict())

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from piazzi.cli import options, output
+from piazzi.cli import options, output, results
 from piazzi.cli.conventions import conventions, told
 from piazzi.cli.running import DONE
 
@@ -22,6 +22,7 @@ TARGETS = (".tdm", ".csv", *ORBITS)
 @click.command(cls=options.Command)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True)
 @options.output("Draw when what was measured, as .png, .pdf or .svg.")
+@results.title_option
 @click.option("--to", "target", metavar="FILE", help="Convert, to .tdm or .csv; orbits to .oem, .opm or .ocm.")
 @options.as_json
 @conventions
@@ -109,5 +110,5 @@ def _draw(path: str, rows: Observations) -> str:
     from piazzi.present.figures.pages import save
     from piazzi.present.figures.tracked import schedule_page
 
-    title = f"{', '.join(rows.objects[:3]) or 'Tracking'}: {len(rows):,} rows"
+    title = results.given_title() or f"{', '.join(rows.objects[:3]) or 'Tracking'}: {len(rows):,} rows"
     return str(save(schedule_page(rows, title), path))

@@ -50,6 +50,7 @@ def whole_numbers(context: click.Context, parameter: click.Parameter, text: str)
 @options.scenario
 @recording_options
 @results.report_option
+@results.title_option
 def command(
     source: str,
     lags: tuple[int, ...],

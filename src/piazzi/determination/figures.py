@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.determination.page.charts import RTN, passes_of, spans
-from piazzi.determination.page.places import GAP, station_rows
+from piazzi.determination.page.places import station_rows
 from piazzi.determination.page.sampled import Sampled, sampled
 from piazzi.determination.residuals import table
 from piazzi.evaluate.quantities import display_of
@@ -166,7 +166,7 @@ def sigmas(ax: Axes, found: Any, path: Sampled) -> Axes:
         style = ("-", "--", ":")[i]
         ax.plot(path.times[known] * time.factor, path.sigmas[known, i] * show.factor, style, color=colour, label=label[0])
     columns = table(found)
-    for start, stop in spans(passes_of(columns, GAP), columns).tolist():
+    for start, stop in spans(passes_of(found, columns), columns).tolist():
         ax.axvspan(start * time.factor, stop * time.factor, color="#E4E4E4", lw=0, zorder=0)
     ax.set_yscale("log")
     plain_ticks(ax)

@@ -9,7 +9,7 @@ from typing import Any
 from piazzi.determination.document import document
 from piazzi.determination.page.charts import gained, known, passes_of, residuals, spans
 from piazzi.determination.page.made import made, modes, tests
-from piazzi.determination.page.places import GAP, sections, station_rows
+from piazzi.determination.page.places import sections, station_rows
 from piazzi.determination.page.sampled import Sampled, sampled
 from piazzi.determination.residuals import table
 from piazzi.determination.showing import grids, heading
@@ -34,7 +34,7 @@ def tab(found: Any) -> Tab:
     rows = station_rows(found, path)
     times = _times(found, path)
     time = Axis(time_label(found.setup.measured.epoch), time_display(times))
-    passes = passes_of(columns, GAP)
+    passes = passes_of(found, columns)
     tone = {False: "bad", True: "good", None: "plain"}
     verdict = sorted(facts["verdict"].items(), key=lambda item: item[1]["ok"] is not False)
     points = [Point(key.capitalize(), one["sentence"], tone[one["ok"]]) for key, one in verdict]  # type: ignore[arg-type]

@@ -159,11 +159,11 @@ class Determination:
 
         write(self, path, **options)
 
-    def report(self, path: Any) -> Any:
+    def report(self, path: Any, title: str | None = None) -> Any:
         """Write a page; returns its path."""
         from piazzi.determination.reporting import report
 
-        return report(self, path)
+        return report(self, path, title)
 
     def ephemeris(
         self, span: Any = None, step: Any = None, frame: str | None = None, *, station: Any = None, when: Any = "tonight",

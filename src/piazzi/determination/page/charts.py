@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from piazzi.determination.holding import passes
 from piazzi.determination.page.sampled import Sampled
 from piazzi.determination.residuals import table
 from piazzi.determination.setup import scale_of
@@ -96,16 +97,11 @@ def spans(passes: Sequence[tuple[str, Array]], columns: dict[str, Array]) -> Arr
     return np.array([[columns["t"][rows].min(), columns["t"][rows].max()] for _, rows in passes]).reshape(-1, 2)
 
 
-def passes_of(columns: dict[str, Array], gap: float) -> list[tuple[str, Array]]:
-    """Station and entries of every pass, in the order of their beginnings."""
-    return sorted(_passes(columns, gap), key=lambda one: float(columns["t"][one[1][0]]))
-
-
-def _passes(columns: dict[str, Array], gap: float) -> Iterator[tuple[str, Array]]:
-    for name in dict.fromkeys(columns["station"].tolist()):
-        own = np.flatnonzero(columns["station"] == name)
-        for rows in np.split(own, np.flatnonzero(np.diff(columns["t"][own]) > gap) + 1):
-            yield name, rows
+def passes_of(found: Any, columns: dict[str, Array]) -> list[tuple[str, Array]]:
+    """Station and entries of every pass, those that the verdict counts, in the order of their beginnings."""
+    row = np.nonzero(found.setup.rows >= 0)[0]  # of the tracking, of every entry
+    every = [np.flatnonzero(np.isin(row, own)) for own in passes(found.setup, np.ones(len(found.setup.rows), dtype=bool))]
+    return [(str(columns["station"][own[0]]), own) for own in every if len(own)]
 
 
 def gained(found: Any, passes: Sequence[tuple[str, Array]], columns: dict[str, Array]) -> Section | None:

@@ -18,7 +18,7 @@ PLANETS = ("mercury", "venus", "earth", "mars", "jupiter", "saturn")
 _AU = Display("AU", 1.0 / ASTRONOMICAL_UNIT)
 _WORDS = (
     "Seen from the north of the ecliptic with the planets, and on the sky as seen from the middle of the Earth, without"
-    " light time; ellipses are three sigma. The second half of the time is prediction."
+    " light time, with east to the left; ellipses are three sigma. The second half of the time is prediction."
 )
 
 
@@ -70,8 +70,8 @@ def _sky(found: Any, path: Sampled, earth: Array) -> list[Orbit]:
     here = [Track(zero, zero, name, 0, *ellipse)]
     along = ("along right ascension", "along declination")
     return [
-        Orbit("On the sky", [Track(x, dec, name, 0, *ellipse)], labels, display_of("rad"), limits),
-        Orbit("Ellipse on the sky at the cursor", here, along, small, close=True),
+        Orbit("On the sky", [Track(x, dec, name, 0, *ellipse)], labels, display_of("rad"), limits, mirrored=True),
+        Orbit("Ellipse on the sky at the cursor", here, along, small, close=True, mirrored=True),
     ]
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination.page.charts import passes_of
 from piazzi.determination.page.ecliptic import ecliptic
 from piazzi.determination.page.sampled import Sampled, fixed
 from piazzi.determination.residuals import table
@@ -16,7 +17,6 @@ from piazzi.present.land import land
 from piazzi.present.report.blocks import Rows, Section, Sky, World
 from piazzi.problem.checks import Array
 
-GAP = 1800.0  # s, of one pass from another
 SHARE = 0.06  # of the orbit's size, that the tube's half-width is about
 _ORBIT = (
     "Drag the globe, or turn it with the arrow keys; play, or drag the slider above. The line is the orbit, dots are where it"
@@ -57,14 +57,17 @@ def station_rows(found: Any, path: Sampled | None) -> list[Rows]:
         if getattr(s.place, "station", None) is not None
     }
     names = list(dict.fromkeys(columns["station"].tolist()))
+    number = np.zeros(len(columns["t"]), dtype=int)
+    for k, (_, entries) in enumerate(passes_of(found, columns)):
+        number[entries] = k
     out = []
     for n, name in enumerate(names):
         own = np.flatnonzero(columns["station"] == name)
-        at, which = np.unique(inverse[own], return_inverse=True)
+        at, first, which = np.unique(inverse[own], return_index=True, return_inverse=True)
         used, reasons = _together(columns, own, which, len(at))
         site = sites[name].position(epochs[int(at[0])]) if name in sites else None
         look = (None, None) if site is None else azimuth_elevation_range(site, place[at])[:2]
-        gaps = np.flatnonzero(np.diff(times[at]) > GAP) + 1
+        gaps = np.flatnonzero(np.diff(number[own][first])) + 1
 
         def apart(values: Any, gaps: Array = gaps) -> Any:
             return None if values is None else np.insert(np.asarray(values, dtype=float), gaps, np.nan, axis=0)

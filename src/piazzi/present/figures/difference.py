@@ -29,7 +29,7 @@ def difference_track(ax: Axes, found: Difference, axis: int) -> Axes:
     return ax
 
 
-def difference_page(found: Difference) -> Figure:
+def difference_page(found: Difference, title: str = "") -> Figure:
     """A picture with the three axes below one another."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -42,5 +42,5 @@ def difference_page(found: Difference) -> Figure:
             difference_track(tracks[axis], found, axis)
         start = (found.epoch + float(found.t[0])).to("UTC", digits=3)
         tracks[2].set_xlabel(f"Time after {start} [{time_display(found.t).unit}]")
-        figure.suptitle(plain(f"{found.names[1]} minus {found.names[0]}"), fontsize=11, x=0.01, ha="left")
+        figure.suptitle(plain(title or f"{found.names[1]} minus {found.names[0]}"), fontsize=11, x=0.01, ha="left")
     return figure

@@ -113,7 +113,8 @@ class Track:
 class Orbit:
     """An animated path about a planet; with `close` errors about the origin, scaled anew at every epoch.
 
-    `sites` are stations: name, colour, and where they stand, or stood when they measured.
+    `sites` are stations: name, colour, and where they stand, or stood when they measured.  Where it is `mirrored`, x grows
+    to the left, as right ascension does on a sky.
     """
 
     title: str
@@ -125,6 +126,7 @@ class Orbit:
     close: bool = False
     note: str = ""
     sites: Sequence[tuple[str, str, Array, Array]] = ()
+    mirrored: bool = False
 
 
 @dataclass(frozen=True)

@@ -239,6 +239,7 @@ class _Builder:
             "show": display_data(orbit.show),
             "limits": list(orbit.limits),
             "planet": orbit.planet_radius,
+            "mirrored": orbit.mirrored,
             "tracks": [self._track(track) for track in orbit.tracks],
             "sites": [
                 {"label": printable(label), "colour": colour, "x": self.pool.add(x), "y": self.pool.add(y)}

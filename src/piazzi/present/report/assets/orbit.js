@@ -15,6 +15,7 @@ class Orbit {
       colour: t.key >= 0 ? tab.keys[t.key].colour : "var(--ink)",
       dash: t.key >= 0 ? tab.keys[t.key].dash.join(" ") : "",
     }));
+    this.side = spec.mirrored ? -1 : 1; // as a sky is seen from within, with east to the left
     const steps = Array.from(tab.times.slice(1), (t, i) => t - tab.times[i]);
     const usual = [...steps].sort((p, q) => p - q)[steps.length >> 1];
     this.breaks = new Set(steps.flatMap((step, i) => (step > 5 * usual ? [i + 1] : []))); // between passes a chord would be no path
@@ -52,7 +53,7 @@ class Orbit {
   }
 
   px(x) {
-    return this.middle[0] + (x - this.centre[0]) * this.unit;
+    return this.middle[0] + this.side * (x - this.centre[0]) * this.unit;
   }
 
   py(y) {
@@ -105,7 +106,8 @@ class Orbit {
   axes() {
     const { left, right, top, bottom } = this.frame;
     const linear = { scale: "linear" };
-    const x = scaleOf(linear, this.centre[0] - (this.middle[0] - left) / this.unit, this.centre[0] + (right - this.middle[0]) / this.unit, left, right);
+    const half = (right - left) / 2 / this.unit;
+    const x = scaleOf(linear, this.centre[0] - half, this.centre[0] + half, ...(this.side > 0 ? [left, right] : [right, left]));
     const y = scaleOf(linear, this.centre[1] - (bottom - this.middle[1]) / this.unit, this.centre[1] + (this.middle[1] - top) / this.unit, bottom, top);
     const grid = [];
     for (const v of ticks(x, 90)) {
@@ -159,7 +161,7 @@ class Orbit {
     track.name.setAttribute("y", cy - 5);
     if (!oval) return;
     for (const [name, value] of [["cx", cx], ["cy", cy], ["rx", oval.a * this.unit], ["ry", oval.b * this.unit]]) track.ellipse.setAttribute(name, value);
-    track.ellipse.setAttribute("transform", `rotate(${(-oval.angle * 180) / Math.PI} ${cx} ${cy})`);
+    track.ellipse.setAttribute("transform", `rotate(${(-this.side * oval.angle * 180) / Math.PI} ${cx} ${cy})`);
   }
 
   // Half-width in round numbers that holds every dot and ellipse shown, so that the axes jump rarely.
