@@ -128,6 +128,25 @@ def test_other_programs_read_the_products(found, tmp_path):
         assert not failed and np.linalg.norm(place - found.orbit.at(epoch)[:3]) < 2e3
 
 
+@pytest.mark.parametrize(("views", "ok"), [(("realtime", "delayed"), True), (("delayed", "delayed"), False)])
+def test_an_answer_of_real_time_may_differ_by_more(views, ok):
+    """In the middle of the rows a filter knows half of them: two sigma of its own are no disagreement with a fit of all."""
+    from types import SimpleNamespace
+
+    from piazzi.determination.verdict import agreed
+
+    estimates = {
+        name: SimpleNamespace(view=view, success=True, mean=np.full((1, 6), 2.0 * i), covariance=np.eye(6)[None])
+        for i, (name, view) in enumerate(zip("ab", views, strict=True))
+    }
+    found = agreed(SimpleNamespace(solution=0), "a", estimates)
+    assert (found.ok, found.figure) == (ok, 2.0)
+
+
+def test_a_page_makes_its_folder(found, tmp_path):
+    assert found.report(tmp_path / "new" / "page").name == "report.html"
+
+
 def test_counts_are_of_all_rows_and_of_those_used(found, facts):
     assert [one["count"] for one in facts["residuals"]] == [len(T)] * 3
     rows = found.residuals

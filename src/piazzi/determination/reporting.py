@@ -18,13 +18,15 @@ from piazzi.evaluate.rows import evaluate
 from piazzi.present.figures.style import time_display, time_label
 from piazzi.present.report import Key, Section, Tab, comparison_tab, write_page
 from piazzi.present.report.blocks import Axis, Point, Table, Text
+from piazzi.present.report.write import page_path
 
 _NOT_DRAWN = "The orbit is not drawn: it is not finite, or it leaves the tables of the forces."
 
 
 def report(found: Any, path: Any, title: str | None = None) -> Path:
-    """Write the page; returns its path."""
+    """Write the page, in a folder that is made where it is not there; returns its path."""
     foot = f"Made by Piazzi {version('piazzi')}. The page needs no network."
+    page_path(path).parent.mkdir(parents=True, exist_ok=True)
     return write_page(path, title or f"Piazzi: {found.object or 'determination'}", [tab(found)], foot=foot)
 
 

@@ -183,15 +183,15 @@ def shown(given: Setup) -> str:
         dv = ", ".join(f"{v:g}" for v in push.burn.dv)
         how = f"over {push.burn.duration:g} s" if push.burn.duration else "at once"
         lines.append(f"Manoeuvre at {push.burn.epoch}: {dv} m/s along {push.burn.axes}, {how}")
-    lines.append("Noise:")
+    noise: dict[str, None] = {}  # each but once: passes of one station are stations of the problem
     for station in problem.stations:
         sensor = problem.model.sensor(station.sensor)
         sigmas = ", ".join(
             f"{c} {number(s, 3)} {u}"
             for c, s, u in zip(sensor.components, np.sqrt(np.diag(station.noise)), dict(sensor.units).values(), strict=True)
         )
-        lines.append(f"  {measured.labels[station.name]} ({station.sensor}): {sigmas}")
-    return "\n".join(printable(text) for text in [*lines, *remarks(facts)])
+        noise[f"  {measured.labels[station.name]} ({station.sensor}): {sigmas}"] = None
+    return "\n".join(printable(text) for text in [*lines, "Noise:", *noise, *remarks(facts)])
 
 
 def _unknown(given: Setup, name: str) -> str:

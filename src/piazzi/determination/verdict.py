@@ -248,7 +248,7 @@ def agreed(given: Setup, name: str, estimates: Mapping[str, Estimate]) -> Senten
     for other, estimate in others.items():
         off = apart_by(answer, estimate, k)
         apart[other] = off
-        limit = NEAR if estimate.view == "delayed" else APART
+        limit = NEAR if estimate.view == answer.view == "delayed" else APART
         if not (estimate.success and off <= limit):
             wrong.append(f"{other} {'failed' if not estimate.success else f'is {number(off, 2)} sigma off'}")
     worst = max(apart.values(), key=lambda v: v if np.isfinite(v) else np.inf)
