@@ -12,7 +12,6 @@ from piazzi.determination.case_file import CASES, split
 from piazzi.determination.centres import EARTH, SUN
 from piazzi.determination.guesses import Guess
 from piazzi.determination.orbit import ECLIPTIC, Orbit
-from piazzi.determination.sky import sight
 from piazzi.determination.unguided import goes_about_the_sun
 from piazzi.formats import Observations, Segment, read_tracking
 from piazzi.orbit import propagate_kepler
@@ -276,19 +275,61 @@ def test_ceres_is_found_again(data_dir):
     off = found.orbit.at() - truth(found.epoch)
     assert np.abs(off / np.sqrt(np.diag(found.orbit.covariance()))).max() < 2.5
     assert off @ np.linalg.solve(found.orbit.covariance(), off) < 14.4  # chi-square of six at 97.5 %, two-sided 2.2 sigma
-    place = sight(found.orbit, DECEMBER)
-
-    def at(epoch):
-        return truth(epoch)[:3] - earth.body("earth", DECEMBER, "sun")[0]
-
+    place = found.ephemeris(station=SITE, when=DECEMBER)
+    here = earth.Place(SITE, DECEMBER, about="sun").at([DECEMBER])[0]
     tau = 0.0
     for _ in range(4):
-        u = at(DECEMBER + -tau)
+        u = truth(DECEMBER + -tau)[:3] - here
         tau = np.linalg.norm(u) / LIGHT
     true = np.arctan2(u[1], u[0]) % (2 * np.pi), np.arcsin(u[2] / np.linalg.norm(u))
     assert np.degrees(np.linalg.norm(place.off(*true))) < 1.0
-    assert place.chi_square(*true) < 9.21  # the ellipse of 99 %; it is just outside that of 95 %: errors go with the nights
+    assert place.chi_square(*true) < 9.21  # the ellipse of 99 %; it is outside that of 95 %: errors go with the nights
     assert "Gauss" in str(found) and "1802-09-14" in str(found)
+
+
+@pytest.mark.slow
+def test_what_is_seen_of_an_orbit_about_the_sun():
+    """Direction, distance, its rate, motion and height by geometry alone; the ellipse by sigma points of two-body motion."""
+    mean = STATE.copy()
+    P = np.diag(np.array([4e8, 3e8, 5e8, 60.0, 40.0, 50.0]) ** 2)
+    facts = {
+        "schema": "piazzi.determine/1", "object": "A", "about": "sun", "epoch": str(EPOCH), "frame": "ICRF",
+        "names": ["x", "y", "z", "vx", "vy", "vz"], "mean": mean.tolist(), "covariance": P.tolist(), "estimated": [],
+        "forces": {"bodies": [], "relativity": False, "empirical": []},
+    }  # fmt: skip
+    t = 86400.0 * 30
+    sky = pz.ephemeris(facts, SITE, (EPOCH + t, EPOCH + t + 1200.0), step=600.0)
+    assert sky.scale == "UTC" and "shadow" not in sky.columns
+    r, _ = line(t + 600.0)
+    u = r / np.linalg.norm(r)
+    assert_allclose(sky["right_ascension"][1], np.arctan2(u[1], u[0]) % (2 * np.pi), atol=1e-9)
+    assert_allclose(sky["declination"][1], np.arcsin(u[2]), atol=1e-9)
+    assert_allclose(sky["range"][1], np.linalg.norm(r), rtol=1e-9)
+    before, after = (line(t + 600.0 + s)[0] for s in (-5.0, 5.0))
+    assert_allclose(sky["range_rate"][1], (np.linalg.norm(after) - np.linalg.norm(before)) / 10.0, atol=1e-2)
+    a, b = before / np.linalg.norm(before), after / np.linalg.norm(after)
+    assert_allclose(sky["rate"][1], np.linalg.norm(np.cross(a, b)) / 10.0, rtol=1e-3)
+    when = EPOCH + t + 600.0
+    local = earth.rotation("GCRF", "ITRF", when) @ u
+    lat, lon, _ = SITE.place(when)
+    up = np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+    assert_allclose(sky["elevation"][1], np.arcsin(local @ up), atol=2e-4)  # aberration is 1e-4
+    here = earth.body("earth", when, "sun")[0]
+    assert_allclose(np.cos(sky["elongation"][1]), -u @ here / np.linalg.norm(here), atol=1e-4)
+    there = propagate_kepler(mean[:3], mean[3:], SUN.mu, t + 600.0 - np.linalg.norm(r) / LIGHT)[0]
+    points = mean + np.vstack([root := np.sqrt(6.0) * np.sqrt(P), -root])
+    off = []
+    for x in points:
+        w = r + propagate_kepler(x[:3], x[3:], SUN.mu, t + 600.0 - np.linalg.norm(r) / LIGHT)[0] - there
+        off.append(sky.off(np.arctan2(w[1], w[0]), np.arcsin(w[2] / np.linalg.norm(w)), 1))
+    assert_allclose(sky.covariance(1), np.transpose(off) @ off / 12, rtol=2e-2, atol=2e-2 * sky["ellipse_minor"][1] ** 2 / 9)
+    assert_allclose(sky.chi_square(*(np.array([sky["right_ascension"][1], sky["declination"][1]])), 1), 0.0, atol=1e-6)
+
+
+def test_what_makes_no_sense_about_the_sun_is_refused(tmp_path):
+    orbit = Guess(EPOCH, STATE[:3], STATE[3:], "ORBIT", about="sun")
+    with pytest.raises(ValueError, match="frequency is that of a satellite"):
+        pz.ephemeris(orbit, SITE, EPOCH, frequency=145.9e6)
 
 
 def test_windows_of_weeks_are_read():

@@ -31,6 +31,10 @@ ENDINGS = (".csv", ".nc", ".cpf")
 @click.option(
     "--forces", metavar="FORCES", help="Of an orbit given by one state, as determine takes them.  [default: by height]"
 )
+@click.option(
+    "--about", type=click.Choice(["earth", "sun"]), default="earth", show_default=True,
+    help="What elements or a state as text go about.",
+)  # fmt: skip
 @click.option("--object", "chosen", metavar="NAME", help="Object in files of several.")
 @options.output("Write .csv, .nc, or positions as .cpf.")
 @options.as_json
@@ -46,6 +50,7 @@ def command(
     angles: str,
     axes: str,
     forces: str | None,
+    about: str,
     chosen: str | None,
     output_file: str | None,
     as_json: bool,
@@ -57,11 +62,14 @@ def command(
     right ascension and declination, azimuth and elevation without refraction,
     range, range-rate, motion on the sky, elevation of the Sun, shadow, and where
     the orbit has a covariance the ellipse of three sigma on the sky and the sigma
-    along the track in seconds.
+    along the track in seconds. Of an orbit about the Sun the elongation from it
+    stands in the place of shadow.
 
     Examples:
       piazzi ephemeris orbit.json --from 7090 --when tonight --passes
       piazzi ephemeris iss.tle --from "lat=50.1deg lon=8.6deg height=100m"
+      piazzi ephemeris ceres.json --from "lat=38.1deg lon=13.4deg" --step 1d
+        --when "1801-12-01T00:00:00 UT1 .. +31d"
       piazzi ephemeris next.oem --from 7825 --step 5min -o next.cpf
         --when "2026-11-03T00:00:00Z .. +1d"
     """
@@ -73,7 +81,7 @@ def command(
         orbit, station, when, step=step, passes=passes, stations=list(stations) or None,
         mask=None if mask is None else quantity(mask, "deg", "--mask"),
         frequency=None if frequency is None else quantity(frequency, "Hz", "--frequency"),
-        angles=angles, axes=axes, object=chosen, forces=forces,
+        angles=angles, axes=axes, object=chosen, forces=forces, about=about,
     )  # fmt: skip
     if output_file is not None:
         found.write(output_file)

@@ -1,9 +1,13 @@
-"""An orbit over time, from whatever says one: where it is and how sure that is, at any date, on the axes of the GCRF."""
+"""An orbit over time, from whatever says one: where it is and how sure that is, at any date, on the axes of the GCRF.
+
+About the Sun these are those of the ICRF, and states are from its centre.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,9 +15,11 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.beliefs import beliefs, carried_to
+from piazzi.determination.centres import EARTH, Centre, centre_of
 from piazzi.determination.guesses import CARTESIAN, SCHEMA, Guess, guess_of
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
-from piazzi.earth import Epoch, Forces
+from piazzi.determination.sun_forces import forces_about_the_sun
+from piazzi.earth import EphemerisWarning, Epoch, Forces
 from piazzi.earth.rotation import frame_named
 from piazzi.formats import read_ephemeris
 from piazzi.formats.ephemeris import MeanElements
@@ -40,6 +46,7 @@ class Course:
     beliefs : gives states (K, 6) and covariances (K, 6, 6), or None, at times (K,)
     source, assumed : where it is from, and what was taken where nothing was said
     spans : pairs of times between which it is known; empty for all times
+    centre : what it goes about
     """
 
     name: str
@@ -48,6 +55,7 @@ class Course:
     source: str
     assumed: tuple[str, ...] = ()
     spans: tuple[tuple[float, float], ...] = ()
+    centre: Centre = EARTH
 
     @property
     def epoch(self) -> Epoch:
@@ -67,7 +75,7 @@ class Course:
                 )
 
 
-def course_of(given: Any, near: Epoch, *, chosen: str | None = None, forces: Any = None) -> Course:
+def course_of(given: Any, near: Epoch, *, chosen: str | None = None, forces: Any = None, about: str = "earth") -> Course:
     """The orbit that is given.
 
     Parameters
@@ -76,6 +84,7 @@ def course_of(given: Any, near: Epoch, *, chosen: str | None = None, forces: Any
     near : a date by which one of several states is taken
     chosen : name of the object in a file of several
     forces : of an orbit that is given by one state, as `determine` takes them; default by height
+    about : what elements and states of text go about
 
     Raises
     ------
@@ -89,8 +98,8 @@ def course_of(given: Any, near: Epoch, *, chosen: str | None = None, forces: Any
     if isinstance(given, Mapping):
         return _of_document(given, "the determination")
     if isinstance(given, Guess) or (isinstance(given, str) and "=" in given and not os.path.exists(given)):
-        guess = guess_of(given, near, where="ORBIT")
-        return _of_state("", guess.epoch, guess.state, None, guess.source, forces, guess.assumed)
+        guess = guess_of(given, near, about=about, where="ORBIT")
+        return _of_state("", guess.epoch, guess.state, None, guess.source, forces, guess.assumed, guess.about)
     if isinstance(given, (str, os.PathLike)):
         facts = _document(os.fspath(given))
         if facts is not None:
@@ -104,7 +113,7 @@ def _of_determination(found: Any) -> Course:
     def at(t: Array) -> tuple[Array, Array | None]:
         return beliefs(setup, found.estimate, [zero + float(x) for x in t])
 
-    return Course(found.object, setup.problem, at, "the determination", setup.assumed)
+    return Course(found.object, setup.problem, at, "the determination", setup.assumed, centre=setup.measured.centre)
 
 
 def _document(path: str) -> Mapping[str, Any] | None:
@@ -147,7 +156,7 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
         raise ValueError(f"{source}: the determination is not whole: {' '.join(str(error).split())}") from None
     if not (np.isfinite(P).all() and P.shape == (len(names), len(names)) and np.isfinite(mean).all()):
         raise ValueError(f"{source}: the determination has no finite covariance")
-    chosen = chosen_forces(_forces_of(said, source), guess.state, name=name)
+    chosen = _chosen(_forces_of(said, source, guess.about), guess.state, name, guess.about)
     own = [p for p in chosen.forces.parameters if p in constants and p in names]
     roles = {p: role for p, role in chosen.roles.items() if p in own} | dict.fromkeys(own, "estimated")
     values: dict[str, Any] = {**_numbers(chosen)}
@@ -159,12 +168,21 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
     moved = J @ P[np.ix_(order, order)] @ J.T
     first = np.concatenate([guess.state, mean[order[6:]]])
     assumed = tuple(str(text) for text in facts.get("assumed", ()))
-    return Course(name, problem, _carrying(problem, chosen.max_step, first, moved), source, assumed)
+    carry = _carrying(problem, chosen.max_step, first, moved)
+    return Course(name, problem, carry, source, assumed, centre=centre_of(guess.about))
 
 
-def _forces_of(said: Mapping[str, Any], source: str) -> Forces:
+def _chosen(forces: Any, state: Array, name: str, about: str) -> Chosen:
+    """The forces on a state."""
+    return forces_about_the_sun(forces, state) if about == "sun" else chosen_forces(forces, state, name=name)
+
+
+def _forces_of(said: Mapping[str, Any], source: str, about: str) -> Forces:
     """The forces that a determination says it used."""
     try:
+        if about == "sun":
+            own = tuple(said["bodies"])
+            return Forces(about="sun", bodies=own, relativity=said["relativity"], nongravitational=tuple(said["empirical"]))
         return Forces(
             gravity=str(said["gravity"]), degree=int(said["degree"]), bodies=tuple(said["bodies"]), tides=tuple(said["tides"]),
             relativity=said["relativity"], radiation=said["radiation"] or False, drag=said["drag"] or False,
@@ -237,9 +255,16 @@ def _axes(r: Array, v: Array) -> Array:
 
 
 def _of_state(
-    name: str, epoch: Epoch, state: Array, P: Array | None, source: str, forces: Any, assumed: tuple[str, ...] = ()
+    name: str,
+    epoch: Epoch,
+    state: Array,
+    P: Array | None,
+    source: str,
+    forces: Any,
+    assumed: tuple[str, ...] = (),
+    about: str = "earth",
 ) -> Course:
-    chosen = chosen_forces(forces, state, name=name)
+    chosen = _chosen(forces, state, name, about)
     problem = _moved_by(forces, state, epoch, name, chosen)
     carry = _carrying(problem, chosen.max_step, state, np.zeros((6, 6)) if P is None else P)
 
@@ -248,9 +273,8 @@ def _of_state(
         return x, None if P is None else covariance
 
     said = tuple(f"{p} = {problem.parameters[p]:.3g}" for p in chosen.roles)
-    return Course(
-        name, problem, at, source, (*assumed, *(text for text in chosen.assumed if " is estimated" not in text), *said)
-    )
+    told = (*assumed, *(text for text in chosen.assumed if " is estimated" not in text), *said)
+    return Course(name, problem, at, source, told, centre=centre_of(about))
 
 
 def _moved_by(forces: Any, state: Array, epoch: Epoch, name: str, chosen: Chosen | None = None) -> Problem:
@@ -267,9 +291,12 @@ def _numbers(chosen: Chosen) -> dict[str, float]:
 def _problem(
     chosen: Chosen, roles: Mapping[str, str], values: Mapping[str, Any], epoch: Epoch, state: Array, P: Array, name: str
 ) -> Problem:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", EphemerisWarning)  # `assumed` says it
+        functions = chosen.choice.functions(epoch)
     return Problem(
         chosen.forces.model((), roles), Gaussian(state, P), parameters=values,
-        integrator=RungeKutta8(max_step=chosen.max_step), functions=chosen.choice.functions(epoch), epoch=epoch,
+        integrator=RungeKutta8(max_step=chosen.max_step), functions=functions, epoch=epoch,
         prior_time=0.0, name=name,
     )  # fmt: skip
 

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.determination.course import Course, course_of
-from piazzi.determination.looking import LIT, SAMPLES, Observer, observer, seen, where
+from piazzi.determination.looking import LIT, LONGEST, SAMPLES, Observer, observer, seen, where
 from piazzi.determination.passing import Instant, Passage, passages, span_of
 from piazzi.determination.words import seconds
 from piazzi.earth import Epoch, Station
+from piazzi.earth.constants import ASTRONOMICAL_UNIT
 from piazzi.earth.stepping import longest_step
 from piazzi.evaluate.grids import Grid, as_html, as_rich
 from piazzi.evaluate.quantities import finite, number
@@ -28,10 +29,13 @@ if TYPE_CHECKING:
 SCHEMA = "piazzi.ephemeris/1"
 STEP = 60.0  # s
 MOST = 10**6  # rows
+_FIRST_UTC = Epoch("1960-01-02T00:00:00 TT")
+_LIGHT = {"earth": "", "sun": "from the Sun\n[deg]"}
 UNITS = {
     "right_ascension": "rad", "declination": "rad", "azimuth": "rad", "elevation": "rad", "range": "m", "range_rate": "m/s",
     "frequency": "Hz", "rate": "rad/s", "position_angle": "rad", "sun_elevation": "rad", "moon_elevation": "rad", "shadow": "",
     "ellipse_major": "rad", "ellipse_minor": "rad", "ellipse_position_angle": "rad", "along_track_sigma": "s",
+    "elongation": "rad",
 }  # fmt: skip
 
 
@@ -44,7 +48,8 @@ class Sky:
     course, station : of what, from where
     angles, axes : of right ascension and declination
     t : (K,), s past `course.epoch`, at the reception
-    columns : by name (K,), SI and radians (`UNITS`); `shadow` is 0 in sunlight, 1 in half-shadow, 2 in full shadow
+    columns : by name (K,), SI and radians (`UNITS`); `shadow` is 0 in sunlight, 1 in half-shadow, 2 in full shadow; about the
+        Sun there is `elongation` from it in its place
     passes : above the mask of the station, where they were asked for
     span : first and last instant that were looked at
     """
@@ -65,8 +70,33 @@ class Sky:
         """Of the rows."""
         return [self.course.epoch + float(x) for x in self.t]
 
+    @property
+    def scale(self) -> str:
+        """That dates are told in: UTC, and before there was one UT1."""
+        return "UTC" if self.span[0] > _FIRST_UTC else "UT1"
+
     def __getitem__(self, name: str) -> Array:
         return self.columns[name]
+
+    def off(self, right_ascension: float, declination: float, row: int = 0) -> Array:
+        """Another place seen from that of a row (2,), rad on the sky: east and north."""
+        ours, east, north = _towards(self.columns["right_ascension"][row], self.columns["declination"][row])
+        there, _, _ = _towards(right_ascension, declination)
+        flat = np.array([east @ there, north @ there])
+        size = float(np.linalg.norm(flat))
+        return flat * (np.arctan2(size, ours @ there) / size) if size else flat
+
+    def covariance(self, row: int = 0) -> Array:
+        """Covariance (2, 2) of the place of a row, rad^2 on the sky, to the east and to the north; KeyError without one."""
+        angle = float(self.columns["ellipse_position_angle"][row])
+        axes = np.array([[np.sin(angle), np.cos(angle)], [np.cos(angle), -np.sin(angle)]])
+        size = np.array([self.columns["ellipse_major"][row], self.columns["ellipse_minor"][row]]) / 3.0
+        return np.asarray(axes.T * size**2 @ axes)
+
+    def chi_square(self, right_ascension: float, declination: float, row: int = 0) -> float:
+        """Squared distance of another place in sigma: it is inside the ellipse of 95 % below 5.99."""
+        off = self.off(right_ascension, declination, row)
+        return float(off @ np.linalg.solve(self.covariance(row), off))
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
@@ -79,7 +109,9 @@ class Sky:
             "schema": SCHEMA, "object": self.course.name, "source": self.course.source, "station": self.station.name,
             "latitude": latitude, "longitude": longitude, "height": height, "angles": self.angles, "axes": self.axes,
             "first": str(self.span[0]), "last": str(self.span[1]), "times": [str(epoch) for epoch in self.epochs],
-            "columns": columns, "units": {name: UNITS[name] for name in columns}, "assumed": list(self.course.assumed),
+            "about": self.course.centre.name,
+            "columns": columns, "units": {name: UNITS[name] for name in columns},
+            "assumed": list(self.course.assumed),
             "passes": None if self.passes is None else [self._passed(one) for one in self.passes],
         }  # fmt: skip
 
@@ -148,6 +180,7 @@ def ephemeris(
     axes: str = "GCRF",
     object: str | None = None,  # noqa: A002  # as everywhere
     forces: Any = None,
+    about: str = "earth",
     now: Epoch | None = None,
 ) -> Sky:
     """Where and when an orbit is seen from a station, by the sensors that tracking is fitted with.
@@ -167,6 +200,7 @@ def ephemeris(
     angles, axes : of right ascension and declination: "astrometric", "geocentric" or "apparent", and a frame
     object : name, in a file of several
     forces : of an orbit that is given by one state, as `determine` takes them; default by height
+    about : what elements or a state of text go about, "earth" or "sun"; a determination says it itself
     now : for "tonight"; default the clock
 
     Raises
@@ -185,7 +219,7 @@ def ephemeris(
         raise ValueError(f"frequency is {frequency:g} Hz; it must be positive")
     if not passes and (last - first) / width > MOST:
         raise ValueError(f"--when with --step {width:g} s makes {(last - first) / width:,.0f} rows; at most {MOST:,} are made")
-    course = course_of(orbit, first, chosen=object, forces=forces)
+    course = course_of(orbit, first, chosen=object, forces=forces, about=about)
     begin, end = first - course.epoch, last - course.epoch
     if passes and not end > begin:
         raise ValueError(f"--when {when!r} is an instant; passes need a span")
@@ -204,16 +238,34 @@ def ephemeris(
 def _looks(given: Observer, begin: float, end: float, width: float) -> Array:
     """Times at which passes are looked for: as near to each other as the orbit is fast at its pericentre."""
     r, v = np.split(given.course.beliefs(np.array([begin]))[0][0], 2)
-    step = min(width, longest_step(r, v, SAMPLES))
+    about_the_sun = given.course.centre.name == "sun"  # where it is the Earth that turns
+    step = min(width, LONGEST if about_the_sun else longest_step(r, v, SAMPLES))
     return np.linspace(begin, end, max(int(np.ceil((end - begin) / step)), 2) + 1)
 
 
-def _clock(epoch: Epoch) -> str:
-    return epoch.to("UTC").split()[0].split(".")[0].replace("T", " ")
+def _clock(sky: Sky, t: float) -> str:
+    return (sky.course.epoch + t).to(sky.scale).split()[0].split(".")[0].replace("T", " ")
+
+
+def _towards(right_ascension: float, declination: float) -> tuple[Array, Array, Array]:
+    """Unit vectors towards a place, east and north there."""
+    c, s, cd, sd = np.cos(right_ascension), np.sin(right_ascension), np.cos(declination), np.sin(declination)
+    return np.array([cd * c, cd * s, sd]), np.array([-s, c, 0.0]), np.array([-sd * c, -sd * s, cd])
 
 
 def _degrees(value: float) -> str:
     return f"{np.degrees(value):.2f}"
+
+
+def _motion(rate: float) -> str:
+    """Arcseconds a second, with a decimal, or three digits where that would be none."""
+    value = float(np.degrees(rate)) * 3600
+    return f"{value:.1f}" if value >= 1.0 else number(value, 3)
+
+
+def _light(sky: Sky, i: int) -> str:
+    """Whether the Sun shines on a satellite, or how far from it a body is on the sky."""
+    return LIT[int(sky.columns["shadow"][i])] if "shadow" in sky.columns else _degrees(sky.columns["elongation"][i])
 
 
 def _passes_grid(sky: Sky) -> Grid:
@@ -221,44 +273,46 @@ def _passes_grid(sky: Sky) -> Grid:
     for one in sky.passes or ():
         cells = []
         for at in (one.rise, one.culmination, one.set):
-            cells += ["-", "-"] if at is None else [_clock(sky.course.epoch + at.time), f"{np.degrees(at.azimuth):.1f}"]
+            cells += ["-", "-"] if at is None else [_clock(sky, at.time), f"{np.degrees(at.azimuth):.1f}"]
         i = int(np.argmin(np.abs(sky.t - one.culmination.time)))
-        lit = LIT[int(sky.columns["shadow"][i])]
-        rows.append((*cells, f"{np.degrees(one.culmination.elevation):.1f}", _degrees(sky.columns["sun_elevation"][i]), lit))
+        high, sun = f"{np.degrees(one.culmination.elevation):.1f}", _degrees(sky.columns["sun_elevation"][i])
+        rows.append((*cells, high, sun, _light(sky, i)))
     heads = (
-        "rise\n[UTC]",
+        f"rise\n[{sky.scale}]",
         "az\n[deg]",
-        "culmination\n[UTC]",
+        f"culmination\n[{sky.scale}]",
         "az\n[deg]",
-        "set\n[UTC]",
+        f"set\n[{sky.scale}]",
         "az\n[deg]",
         "highest\n[deg]",
         "Sun\n[deg]",
-        "",
+        _LIGHT[sky.course.centre.name],
     )
     return Grid(f"Passes: {len(rows)}", heads, tuple(rows))
 
 
 def _rows_grid(sky: Sky, most: int = 60) -> Grid:
     c = sky.columns
+    unit, metres, far = ("au", ASTRONOMICAL_UNIT, "{:.6f}") if sky.course.centre.name == "sun" else ("km", 1e3, "{:.3f}")
     heads = [
-        "time\n[UTC]",
+        f"time\n[{sky.scale}]",
         "RA\n[deg]",
         "Dec\n[deg]",
         "az\n[deg]",
         "el\n[deg]",
-        "range\n[km]",
+        f"range\n[{unit}]",
         "rate\n[km/s]",
         "motion\n[arcsec/s]",
     ]
-    heads += ["Sun\n[deg]", "", *(["3 sigma\n[arcsec]", "along\n[s]"] if "ellipse_major" in c else [])]
+    heads += ["Sun\n[deg]", _LIGHT[sky.course.centre.name]]
+    heads += ["3 sigma\n[arcsec]", "along\n[s]"] if "ellipse_major" in c else []
     heads += ["frequency\n[Hz]"] if "frequency" in c else []
     rows = []
     for i in range(min(len(sky.t), most)):
-        cells = [_clock(sky.course.epoch + float(sky.t[i])), f"{np.degrees(c['right_ascension'][i]):.4f}"]
+        cells = [_clock(sky, float(sky.t[i])), f"{np.degrees(c['right_ascension'][i]):.4f}"]
         cells += [f"{np.degrees(c['declination'][i]):.4f}", _degrees(c["azimuth"][i]), _degrees(c["elevation"][i])]
-        cells += [f"{c['range'][i] / 1e3:.3f}", f"{c['range_rate'][i] / 1e3:.4f}", f"{np.degrees(c['rate'][i]) * 3600:.1f}"]
-        cells += [_degrees(c["sun_elevation"][i]), LIT[int(c["shadow"][i])]]
+        cells += [far.format(c["range"][i] / metres), f"{c['range_rate'][i] / 1e3:.4f}", _motion(float(c["rate"][i]))]
+        cells += [_degrees(c["sun_elevation"][i]), _light(sky, i)]
         if "ellipse_major" in c:
             axes = " x ".join(number(np.degrees(c[f"ellipse_{k}"][i]) * 3600, 2) for k in ("major", "minor"))
             cells += [axes, number(c["along_track_sigma"][i], 2)]

@@ -19,7 +19,7 @@ from piazzi.text import escape_formula, printable
 
 ENDINGS = (".csv", ".nc", ".cpf")
 IN_DEGREES = {
-    "right_ascension", "declination", "azimuth", "elevation", "position_angle", "sun_elevation", "moon_elevation",
+    "right_ascension", "declination", "azimuth", "elongation", "elevation", "position_angle", "sun_elevation", "moon_elevation",
     "ellipse_position_angle",
 }  # fmt: skip
 IN_ARCSECONDS = {"rate": "arcsec/s", "ellipse_major": "arcsec", "ellipse_minor": "arcsec"}
@@ -39,6 +39,8 @@ def write(sky: Any, path: Any) -> None:
         return
     if ending == ".cpf" and sky.passes is not None:
         raise ValueError(f"-o {path}: a prediction in CPF has rows at steps, not passes")
+    if ending == ".cpf" and sky.course.centre.name == "sun":
+        raise ValueError(f"-o {path}: predictions in CPF are of satellites of the Earth, and the orbit goes about the Sun")
     text = cpf_text(sky) if ending == ".cpf" else (_passes_text(sky) if sky.passes is not None else _table_text(sky))
     with atomic_path(path) as work:
         work.write_text(text, encoding="utf-8")
@@ -49,10 +51,10 @@ def _table_text(sky: Any) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     columns = [_shown(name, values) for name, values in sky.columns.items()]
-    writer.writerow(["time[UTC]", "station", *(head for head, _ in columns)])
+    writer.writerow([f"time[{sky.scale}]", "station", *(head for head, _ in columns)])
     cells = [values for _, values in columns]
     station = escape_formula(printable(sky.station.name))
-    for k, when in enumerate(dates("UTC", sky.course.epoch, sky.t)):
+    for k, when in enumerate(dates(sky.scale, sky.course.epoch, sky.t)):
         writer.writerow([when, station, *(one[k] for one in cells)])
     return out.getvalue()
 
@@ -71,12 +73,12 @@ def _passes_text(sky: Any) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     events = ("rise", "culmination", "set")
-    writer.writerow([f"{e}_{what}" for e in events for what in ("time[UTC]", "azimuth[deg]", "elevation[deg]")])
+    writer.writerow([f"{e}_{what}" for e in events for what in (f"time[{sky.scale}]", "azimuth[deg]", "elevation[deg]")])
     for one in sky.passes:
         cells: list[Any] = []
         for at in (one.rise, one.culmination, one.set):
             found = ["", "", ""] if at is None else [
-                dates("UTC", sky.course.epoch, [at.time])[0], np.degrees(at.azimuth), np.degrees(at.elevation),
+                dates(sky.scale, sky.course.epoch, [at.time])[0], np.degrees(at.azimuth), np.degrees(at.elevation),
             ]  # fmt: skip
             cells += found
         writer.writerow(cells)
