@@ -115,7 +115,7 @@ class FromTheSun(Observer):
         line, speed, late = self._line(t, states)
         distance = np.linalg.norm(line, axis=1)
         if sensor == RANGE:
-            return distance[:, None]
+            return np.asarray(distance[:, None])
         u = line / distance[:, None]
         along, own = np.sum(u * late, axis=1), np.sum(u * speed, axis=1)
         return np.asarray(((along - own) / (1.0 + along / SPEED_OF_LIGHT))[:, None])
@@ -128,7 +128,7 @@ class FromTheSun(Observer):
         for _ in range(ROUNDS):
             r, v = propagate_kepler(states[:, :3], states[:, 3:], self.course.centre.mu, -delay)
             delay = np.linalg.norm(r - here, axis=1) / SPEED_OF_LIGHT
-        return r - here, speed, v
+        return np.asarray(r - here), speed, v
 
     def _mount(self, t: Array, apparent: Array) -> Array:
         """Azimuth and elevation (K, 2) of apparent directions, without refraction."""
