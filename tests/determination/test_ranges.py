@@ -138,6 +138,27 @@ def test_what_is_applied_already_is_not_applied_again():
     assert all(s.numbers["centre_of_mass"] == 0.0 for s in made.stations)
 
 
+@pytest.mark.parametrize("name", ["range", "station delay"])
+@pytest.mark.parametrize(("range_is", "share"), [("half", 1.0), ("sum", 0.5)])
+def test_what_the_file_states_and_has_not_applied_is_added_once(name, range_is, share):
+    """Of a range that is all of the way the correction is too."""
+    t, station = np.arange(3.0), np.zeros(3, dtype=int)
+    plain = measured(ranges(t, station, range_is=range_is)).tracking.values
+    for applied, more in ((True, 0.0), (False, -12.5 * share)):
+        made = measured(ranges(t, station, range_is=range_is, corrections=(Correction(name, -12.5, applied),)))
+        np.testing.assert_allclose(made.tracking.values - plain, more, atol=1e-9)
+        assert any(f"correction of {name}" in text for text in made.assumed) is not applied
+
+
+def test_a_delay_without_a_number_is_refused_by_name():
+    t, station, lost = np.arange(3.0), np.zeros(3, dtype=int), (Correction("station delay", None, False),)
+    rows = ranges(t, station, corrections=lost, participants=("7090", "LAGEOS-2"))
+    with pytest.raises(ValueError, match="ranges of 7090 have the delay of the station in them"):
+        measured(rows)
+    sites = [replace(earth.ilrs_stations()["7090"], bias={"range": 7.5})]
+    assert [s.numbers["range_bias"] for s in measured(rows, sites).stations] == [7.5]
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [

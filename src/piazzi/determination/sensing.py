@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.centres import Centre, centre_of
+from piazzi.determination.correcting import with_corrections
 from piazzi.determination.directions import AZEL, RADEC, ascensions, azimuths
 from piazzi.determination.fixes import fixes
 from piazzi.determination.frequencies import frequencies
@@ -114,6 +115,7 @@ def measured(
         sites = sites_of("ilrs")
     everything = replace(observations, sigma=with_station_sigmas(observations, sites))
     _ask(everything)
+    everything, added = with_corrections(everything, sites)
     usable = everything.measured & everything.used
     left_out = dict(everything.left_out)
     unused = int(np.count_nonzero(everything.measured & ~everything.used))
@@ -140,7 +142,7 @@ def measured(
     tracking = Tracking(times[by_time], values[by_time], np.array(names)[by_time], epoch=epoch)
     in_order = bool(np.all(everything.t[1:] >= everything.t[:-1]))
     sorted_ = () if in_order else ("rows were out of order, and are sorted by time",)
-    said = [*everything.assumed, *sorted_, *context.said, *(sites.notes if sites else ())]
+    said = [*everything.assumed, *added, *sorted_, *context.said, *(sites.notes if sites else ())]
     return Measured(
         everything, context.object, sensors, places, tracking, rows[by_time], labels, epoch,
         {name: value for part in parts for name, value in part.functions.items()},

@@ -64,13 +64,13 @@ def station_named(name: str, sites: StationList | None, where: str = "") -> Stat
     """The station of a list; raises ValueError with how to give it."""
     if sites is None:
         raise ValueError(f"{where}where is station {name}? Give it with --stations FILE (TOML or SINEX), ilrs or mpc")
-    found = _matched(name, sites)
+    found = matched(name, sites)
     if found is None:
         raise ValueError(f"{where}no station {name} in --stations{nearest(name, list(sites)[:2000])}")
     return found
 
 
-def _matched(name: str, sites: StationList) -> Station | None:
+def matched(name: str, sites: StationList) -> Station | None:
     """A station by its name, or by it without leading zeros or the letter of its point."""
     for known in (name, name.lstrip("0"), f"{name}A"):
         if known in sites:
@@ -123,7 +123,7 @@ def with_station_sigmas(observations: Observations, sites: StationList | None) -
         return sigma
     sigma = sigma.copy()
     for i in np.unique(observations.station):
-        site = None if i < 0 else _matched(observations.participants[i], sites)
+        site = None if i < 0 else matched(observations.participants[i], sites)
         for kind, value in (site.sigma if site else {}).items():
             own = np.isnan(sigma) & (observations.station == i) & observations.of_kind(kind)
             sigma[own] = value
