@@ -300,3 +300,23 @@ def test_lines_of_any_order_and_size_are_those_of_a_plain_reader(tmp_path):
     assert_array_equal(rows.value, values)
     start = pz.Epoch("2020-03-01T00:00:00 UTC") - rows.epoch
     assert_allclose(rows.t - start, seconds, rtol=0, atol=2e-11)
+
+
+def test_ranges_in_range_units_are_metres_once_their_length_is_said(data_dir):
+    path = data_dir / "tdm" / "TDMExample4.txt"
+    raw = pz.read_tracking(path)
+    assert any("--range-unit 0.28m" in text for text in raw.open) and any("range_ru=...RU" in text for text in raw.open)
+    for said in ("0.25m", "DSS-24=25cm", ["1m", "DSS-24=0.25 m"]):
+        rows = pz.read_tracking(path, range_unit=said, range="two-way")
+        there = raw.of_kind("range_ru")
+        assert_array_equal(rows.of_kind("range"), there)
+        assert_array_equal(rows.value[there], 0.25 * raw.value[there])
+        assert_array_equal(rows.value[~there], raw.value[~there])
+        assert rows.segments[0].range_modulus == 0.25 * 2e26
+        assert rows.segments[0].corrections == (Correction("range", 0.25 * 46.7741, True),)
+        assert not any("RU" in text or "unit" in text for text in rows.open)
+        assert any("range=...m" in text for text in rows.open)
+    assert_allclose(pz.read_tracking(path, range_unit="0.25m", sigma="range=3m").sigma[there], 3.0)
+    for said, what in (("3 kg", "is a length"), ("short", "is a length"), ("-1m", "is a length"), ("X=1m", "no such station")):
+        with pytest.raises(ValueError, match=what):
+            pz.read_tracking(path, range_unit=said)

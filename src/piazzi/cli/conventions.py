@@ -22,6 +22,7 @@ _OPTIONS: tuple[tuple[str, str, str, bool], ...] = (
     ("debias", "FILE", "Take biases of star catalogues off asteroid astrometry: bias.dat of Eggl et al. 2020.", False),
     ("columns", "NAMES", "What columns of tables are: 'week=gps_week sow=gps_tow x=X[km] ignore=Q'.", False),
     ("scale", "SCALE", "Time scale of dates that name none: UTC, GPS, ...", False),
+    ("range-unit", "LENGTH", "How long a range unit (RU) is, as 0.28m or DSS-25=0.28m; may be repeated.", True),
     ("time", "SCALE", "Time scale of a station's dates, as BER=GPS; may be repeated.", True),
     ("sigma", "SIGMA", "Standard deviations, as 10m, range=10m or range.BER=10m; may be repeated.", True),
 )

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 # What files leave open, by the names that `read_tracking` takes; `cli.conventions` has their lines of help
 ANSWERS = (
-    "range", "angles", "tag", "frame", "corrections", "interval", "interval_reference", "repair", "time", "sigma", "scale",
-    "columns", "debias",
+    "range", "angles", "tag", "frame", "corrections", "interval", "interval_reference", "repair", "range_unit", "time", "sigma",
+    "scale", "columns", "debias",
 )  # fmt: skip
 
 

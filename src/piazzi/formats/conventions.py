@@ -13,6 +13,7 @@ from piazzi.earth.scales import SCALES
 from piazzi.formats.frames import KNOWN, frame_named, settled
 from piazzi.formats.kinds import ANGLES, KINDS, TAGS
 from piazzi.formats.observations import Array, Observations, Segment
+from piazzi.formats.range_units import in_metres, range_unit_of
 from piazzi.tables.names import parse_columns
 from piazzi.text import brief, nearest, suggest
 from piazzi.units import Units
@@ -48,6 +49,7 @@ class Conventions:
     corrections : ``applied``, or ``open`` where they are still to be applied
     interval, interval_reference : s over which rates are averaged, and the part of it that times are of
     scales : time scale by station, that of all others under ""
+    range_units : m, by station, that of all others under ""
     sigmas : standard deviations
     columns : of tables, our names and those of the file
     options : whatever else one format asks for, by name
@@ -62,6 +64,7 @@ class Conventions:
     interval: float | None = None
     interval_reference: str | None = None
     scales: tuple[tuple[str, str], ...] = ()
+    range_units: tuple[tuple[str, float], ...] = ()
     sigmas: tuple[Sigma, ...] = ()
     columns: tuple[tuple[str, str], ...] = ()
     options: tuple[tuple[str, Any], ...] = ()
@@ -71,7 +74,15 @@ class Conventions:
 
     @classmethod
     def of(
-        cls, *, time: Any = None, scale: Any = None, sigma: Any = None, interval: Any = None, columns: Any = None, **words: Any
+        cls,
+        *,
+        time: Any = None,
+        scale: Any = None,
+        sigma: Any = None,
+        interval: Any = None,
+        columns: Any = None,
+        range_unit: Any = None,
+        **words: Any,
     ) -> Conventions:
         """Conventions from words, as the command line and `read_tracking` take them; `scale` is `time` of all stations.
 
@@ -96,6 +107,7 @@ class Conventions:
             frame=frame,
             interval=seconds,
             scales=scales,
+            range_units=tuple(range_unit_of(text) for text in _texts(range_unit)),
             sigmas=sigmas,
             columns=tuple(named.items()),
             options=tuple(words.items()),
@@ -171,6 +183,7 @@ def with_conventions(observations: Observations, told: Conventions) -> Observati
     ValueError
         For a sigma that no row takes.
     """
+    observations = in_metres(observations, dict(told.range_units), told.partial)
     segments = tuple(_completed(segment, told) for segment in observations.segments)
     sigma = _sigmas(observations, told)
     all_known = bool(told.sigmas) and not np.isnan(sigma[observations.measured]).any()

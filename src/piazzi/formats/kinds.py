@@ -16,7 +16,7 @@ class Kind(NamedTuple):
 KINDS: Mapping[str, Kind] = {
     # along the line of sight; `Segment.way` and `Segment.range_is` say which legs
     "range": Kind("m"),
-    "range_ru": Kind("RU"),  # range units of the ranging machine, which only its station can turn into metres
+    "range_ru": Kind("RU"),  # range units of the ranging machine; --range-unit says how long one is
     "time_of_flight": Kind("s"),
     "range_rate": Kind("m/s"),  # of the instant; positive when receding
     "range_rate_averaged": Kind("m/s"),  # over `Segment.interval`

@@ -28,7 +28,7 @@ def open_of(segments: Sequence[Segment], present: Mapping[str, int]) -> tuple[st
         along = f"ranges and range rates along {'; '.join(closed[:3])}"
         out.append(f"whether {along} are half or all of the way: --range two-way or --range round-trip")
     if "range_ru" in kinds:
-        out.append("how long a range unit of the station is: without it ranges in RU are left out")
+        out.append("how long a range unit of the station is: --range-unit 0.28m")
     if "range_rate_averaged" in kinds and any(s.interval is None or s.interval_reference is None for s in segments):
         out.append("over which interval range rates are averaged: --interval 60 and --interval-reference middle")
     if "right_ascension" in kinds:

@@ -97,6 +97,7 @@ def read_recording(table: Table) -> Recording:
     sigma, stations = table.texts("sigma"), table.texts("stations")
     answers: dict[str, Any] = {name: table.text(name) for name in ANSWERS}
     answers |= {"interval": table.number("interval", positive=True), "time": table.texts("time")}
+    answers["range_unit"] = table.texts("range_unit")
     table.finish()
     return Recording(columns, scale, chosen, sigma, stations, frame, {k: v for k, v in answers.items() if v})
 
