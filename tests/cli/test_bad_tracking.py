@@ -6,6 +6,7 @@ from piazzi.cli.main import main
 
 GUESS = "a=7078km e=0.001 i=98.2deg raan=10deg argp=0deg nu=0deg epoch=2020-01-01T00:00:00Z"
 RANGES = "RANGE = 2020-01-01T00:00:00 7000\nRANGE = 2020-01-01T00:01:00 7100\n"
+UNITS = "RANGE = 2020-01-01T00:00:00 9\n"
 TURNED = "ANGLE_TYPE = RADEC\nREFERENCE_FRAME = EME2000\nCORRECTION_ABERRATION_DIURNAL = 0.001\nCORRECTIONS_APPLIED = NO\n"
 ANGLES = "ANGLE_1 = 2020-01-01T00:00:00 100\nANGLE_2 = 2020-01-01T00:00:00 20\n"
 
@@ -60,7 +61,7 @@ def determine(run, text, *words):
         ("time,station,azimuth [h]\n2020-01-01T00:00:00Z,DSS,7\n", (), "hours of right ascension are 15 deg each"),
         (message(segment("RECEIVE_FREQ_1 = 2020-01-01T00:00:00 4e8\n")), ("--sigma", "1Hz"), "frequencies of two-way signals"),
         (message(segment("RECEIVE_FREQ_3 = 2020-01-01T00:00:00 4e8\n")), ("--sigma", "1Hz"), "RECEIVE_FREQ_3"),
-        (message(segment("RANGE = 2020-01-01T00:00:00 9\n", extra="RANGE_UNITS = RU\n")), ("--range", "two-way"), "--range-unit 0.28m"),
+        (message(segment(UNITS, extra="RANGE_UNITS = RU\n")), ("--range", "two-way"), "--range-unit 0.28m"),
         (
             message(segment(ANGLES, path="2,1", extra=TURNED)),
             ("--sigma", "1arcsec", "--angles", "astrometric", "--stations", "dss.toml"),

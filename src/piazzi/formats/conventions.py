@@ -187,8 +187,8 @@ def with_conventions(observations: Observations, told: Conventions) -> Observati
     segments = tuple(_completed(segment, told) for segment in observations.segments)
     sigma = _sigmas(observations, told)
     all_known = bool(told.sigmas) and not np.isnan(sigma[observations.measured]).any()
-    answered = {f"--{name.replace('_', '-')}" for name in (*WORDS, "frame", "interval") if getattr(told, name) is not None}
-    answered |= {"--sigma"} if all_known else set()
+    answered = {f"--{name.replace('_', '-')} " for name in (*WORDS, "frame", "interval") if getattr(told, name) is not None}
+    answered |= {"--sigma "} if all_known else set()
     left = tuple(text for text in observations.open if not any(option in text for option in answered))
     return replace(observations, segments=segments, open=left, sigma=sigma, tag=_tags(observations, told))
 
