@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from piazzi.earth import force_sun, force_text
+from piazzi.earth import force_harmonics, force_sun, force_text
 from piazzi.text import nearest
 
 USUAL = ("usual",)
@@ -24,6 +24,7 @@ _KNOWN: dict[str, dict[str, tuple[str, ...]]] = {
         "relativity": _RELATIVITY,
         "shadows": _SHADOWS,
         "empirical": ("constant", "once-per-rev", *CONSTANT, *ONCE_PER_REV),
+        "harmonics": force_harmonics.HARMONICS,
         "nongravitational": (),
         "asteroids": (),
     },
@@ -33,6 +34,7 @@ _KNOWN: dict[str, dict[str, tuple[str, ...]]] = {
         "relativity": _RELATIVITY[:1],
         "shadows": (),
         "empirical": (),
+        "harmonics": (),
         "nongravitational": force_sun.NONGRAVITATIONAL,
         "asteroids": tuple(force_sun.ASTEROIDS),
     },

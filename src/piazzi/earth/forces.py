@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, cast
 
-from piazzi.earth import force_air, force_sun, force_text
+from piazzi.earth import force_air, force_harmonics, force_sun, force_text
 from piazzi.earth.atmosphere import HarrisPriester
 from piazzi.earth.bodies import SERIES_ERROR, EphemerisWarning
 from piazzi.earth.celestial import Asteroid, GeodesicPrecession
@@ -57,6 +57,7 @@ class Forces:
     about : "earth" or "sun"
     nongravitational : any of "A1", "A2", "A3" (m/s2 at one astronomical unit), about the Sun
     asteroids : those that draw the body, about the Sun; they need a kernel of their own
+    harmonics : normalised coefficients such as "C20" or "S22", to degree 9: parameters `delta_C20` are added to the field's
     shadow_edges : whether steps end where the Earth's half-shadow begins and ends, as events of the model
 
     Raises
@@ -80,6 +81,7 @@ class Forces:
     nongravitational: Sequence[str] = ()
     asteroids: Sequence[str] = ()
     shadow_edges: bool = False
+    harmonics: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         for name in options(self.about):
@@ -108,6 +110,7 @@ class Forces:
             asteroids = {name: force_sun.ASTEROIDS[name] for name in self.asteroids}
             return force_sun.parts(bodies, asteroids, bool(relativity), self.nongravitational)
         fixed = [force_text.degree_2(kind) for kind in ("k1", "pole") if kind in tides]
+        fixed += [force_harmonics.harmonics(self.harmonics, self.field.gm, self.field.radius)] if self.harmonics else []
         return (
             force_text.gravity(fixed),
             *(force_text.third_body(name, GM[name]) for name in bodies),
