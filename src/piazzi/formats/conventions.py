@@ -24,6 +24,7 @@ WORDS: Mapping[str, Iterable[str]] = {
     "range": RANGES, "angles": ANGLES, "tag": TAGS[1:], "corrections": ("applied", "open"),
     "interval_reference": ("start", "middle", "end"),
 }  # fmt: skip
+_OPTION = re.compile(r"--[a-z-]+")
 _SIGMA = re.compile(r"(?:(?P<kind>[a-z_]+)(?:\.(?P<station>[^=]+))?=)?(?P<number>[-+.0-9eE]+)\s*(?P<unit>[a-zA-Z/*^0-9]*)")
 
 
@@ -187,9 +188,9 @@ def with_conventions(observations: Observations, told: Conventions) -> Observati
     segments = tuple(_completed(segment, told) for segment in observations.segments)
     sigma = _sigmas(observations, told)
     all_known = bool(told.sigmas) and not np.isnan(sigma[observations.measured]).any()
-    answered = {f"--{name.replace('_', '-')} " for name in (*WORDS, "frame", "interval") if getattr(told, name) is not None}
-    answered |= {"--sigma "} if all_known else set()
-    left = tuple(text for text in observations.open if not any(option in text for option in answered))
+    answered = {f"--{name.replace('_', '-')}" for name in (*WORDS, "frame", "interval") if getattr(told, name) is not None}
+    answered |= {"--sigma"} if all_known else set()
+    left = tuple(text for text in observations.open if answered.isdisjoint(_OPTION.findall(text)))
     return replace(observations, segments=segments, open=left, sigma=sigma, tag=_tags(observations, told))
 
 
