@@ -143,6 +143,17 @@ def test_an_answer_of_real_time_may_differ_by_more(views, ok):
     assert (found.ok, found.figure) == (ok, 2.0)
 
 
+def test_the_answer_stands_at_the_last_row_that_was_used(path):
+    wrong = path.copy()
+    wrong[-1] += 5e3
+    found = pz.determine(observations(wrong, T, SIGMA))
+    assert abs(found.epoch - (EPOCH + T[-2])) < 1e-9 and found.to_dict()["span"]["last"] == found.to_dict()["epoch"]
+    assert {one["reason"] for one in found.to_dict()["rejected"]} == {"outlier"}
+    asked = pz.determine(observations(wrong, T, SIGMA), epoch=EPOCH + T[-1])
+    assert abs(asked.epoch - (EPOCH + T[-1])) < 1e-9
+    np.testing.assert_allclose(asked.orbit.at(found.epoch), found.orbit.at(), rtol=0, atol=1e-3)
+
+
 def test_a_page_makes_its_folder(found, tmp_path):
     assert found.report(tmp_path / "new" / "page").name == "report.html"
 

@@ -31,6 +31,17 @@ def test_an_orbit_as_text_is_called_what_the_command_calls_it():
         course_of("a=7078km nu=1deg epoch=2026-11-03T04:12:00Z", EPOCH)
 
 
+def test_two_line_elements_that_are_old_say_so(tmp_path):
+    lines = (
+        "1 25544U 98067A   08264.51782528 -.00002182  00000-0 -11606-4 0  2927",
+        "2 25544  51.6416 247.4627 0006703 130.5360 325.0288 15.72125391563537",
+    )
+    (tmp_path / "x.tle").write_text("\n".join(lines) + "\n")
+    new, old = (course_of(tmp_path / "x.tle", pz.Epoch(f"{year}-09-21T00:00:00 UTC")) for year in (2008, 2011))
+    assert not any("days away" in text for text in new.assumed)
+    assert any("elements that are 1,09" in text and "days away" in text for text in old.assumed)
+
+
 # ---- without kernels -------------------------------------------------------------------------------------------------
 
 

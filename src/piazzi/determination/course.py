@@ -32,6 +32,7 @@ from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 
 HDF5, JSON = b"\x89HDF", b"{"
+OLD = 10.0  # days from two-line elements, from which on it is said
 Beliefs = Callable[[Array], tuple[Array, Array | None]]
 
 
@@ -206,7 +207,10 @@ def _of_orbit(given: Any, near: Epoch, chosen: str | None, forces: Any) -> Cours
             place, speed = sgp4_states(mean_elements, [mean_elements.epoch + float(x) for x in t], "GCRF")
             return np.hstack([place, speed]), None
 
-        return Course(problem.name, problem, by_theory, source, ("by SGP4, which has no covariance",))
+        said, days = ["by SGP4, which has no covariance"], abs(near - mean_elements.epoch) / 86400.0
+        if days > OLD:
+            said.append(f"elements that are {days:,.0f} days away, though SGP4 loses kilometres in a few days")
+        return Course(problem.name, problem, by_theory, source, tuple(said))
     if not isinstance(found, tuple):
         raise ValueError(f"{source}: an orbit is a file, an ephemeris, elements or a determination")
     if sum(int(np.isfinite(arc.position).all(axis=1).sum()) for arc in found) < 2:

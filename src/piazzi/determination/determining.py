@@ -30,7 +30,7 @@ from piazzi.determination.instruments import with_instruments
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
 from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object
-from piazzi.determination.setup import Setup, posed, setup
+from piazzi.determination.setup import Setup, at_last_used, posed, setup
 from piazzi.determination.sun_forces import forces_about_the_sun
 from piazzi.determination.unguided import first_look, goes_about_the_sun, unguided
 from piazzi.determination.unknowns import BIAS, CLOCK, SCALE, asked
@@ -242,6 +242,7 @@ def solved(
     seconds = time.perf_counter() - started
     announce("testing")
     case = Case() if case is None else case
+    given = at_last_used(given, keep) if case.epoch is None else given
     faults = _faults(given, found[answer], analysis, keep, reasons)
     unseen = _unseen(given, chosen[answer], found[answer], analysis, keep, case.hold)
     sentences = verdict(given, answer, found, analysis, keep, faults, unseen)

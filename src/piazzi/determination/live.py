@@ -11,7 +11,7 @@ import numpy as np
 
 from piazzi.determination.fit import kept
 from piazzi.determination.sensing import Measured
-from piazzi.determination.setup import Setup, follow, posed
+from piazzi.determination.setup import Setup, at_last_used, follow, posed
 from piazzi.earth import Epoch
 from piazzi.estimate.estimator import Estimate
 from piazzi.orbit import state_axes
@@ -252,7 +252,7 @@ class Live:
         found = replace(
             given, measured=seen, problem=problem, tracking=tracking, rows=seen.rows, states=states, solution=len(mean) - 1
         )
-        return found, estimate, keep, reasons
+        return at_last_used(found, keep), estimate, keep, reasons
 
     def _orbit(self, problem: Problem, times: Array) -> Array:
         """States (K, n) of one orbit without process noise that is the newest belief at its time."""

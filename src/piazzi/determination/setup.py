@@ -107,6 +107,16 @@ def setup(
     return Setup(measured, chosen, guess, problem, tracking, rows, states, solution, said, earlier, before)
 
 
+def at_last_used(given: Setup, keep: Array) -> Setup:
+    """The same with the answer at the last row that was used, where it stood at the last row."""
+    tracking = given.tracking
+    used = tracking.row_times[keep & np.isfinite(tracking.values).any(axis=1)]
+    asked = given.solution < len(tracking.times) - 1 or not (given.rows[-1] >= 0).any()  # a date of its own
+    if asked or not len(used):
+        return given
+    return replace(given, solution=int(np.searchsorted(tracking.times, used.max())))
+
+
 def _known(problem: Problem, earlier: Earlier, t: float) -> Problem:
     """The problem with an earlier orbit for its prior, and what that knew of the same processes and constants."""
     mean, P = problem.prior.mean.copy(), problem.prior.covariance.copy()
