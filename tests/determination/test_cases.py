@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray
 
 import piazzi as pz
 from piazzi.determination.case_file import CASES, names, split
@@ -17,7 +18,7 @@ def test_every_case_has_its_tracking_and_says_how_it_is_run():
 
 
 @pytest.mark.slow
-def test_lasers_determine_lageos_2():
+def test_lasers_determine_lageos_2(tmp_path):
     """Half a metre from the state that another laboratory published for 16:00 on 13 February (EME2000, here to 0.7 m)."""
     found = pz.determine("lageos-2")
     assert found.determined and found.keep.all() and len(found.keep) == 95
@@ -34,3 +35,7 @@ def test_lasers_determine_lageos_2():
         found.plot(which="rang")
     with pytest.raises(ValueError, match="unknown station '7091'"):
         found.plot(what="sky", which="7091")
+    found.write(tmp_path / "found.nc")
+    with xarray.open_dataset(tmp_path / "found.nc") as data:
+        assert not [name for name in data.variables if hasattr(xarray.Dataset, name)]
+        np.testing.assert_array_equal(data["state_mean"], found.to_dict()["mean"])

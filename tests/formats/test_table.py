@@ -126,7 +126,9 @@ def test_a_fix_that_lacks_a_coordinate_is_left_out_and_counted(tmp_path):
 
 
 def test_seconds_past_a_date_above_the_header(tmp_path):
+    named = pz.read_tracking(table(tmp_path, "time[s past 2024-05-05T12:00:00 UTC],x[m],y[m],z[m]\n0.5,1,2,3\n"))
     rows = pz.read_tracking(table(tmp_path, "# epoch = 2024-05-05T12:00:00 UTC\ntime,x[m],y[m],z[m]\n0.5,1,2,3\n"))
+    assert named.instant(0) == rows.instant(0)
     assert rows.instant(0) == T0 + 0.5
 
 

@@ -5,6 +5,7 @@ import datetime
 import time
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray
 from hypothesis import given, settings
@@ -189,7 +190,9 @@ def test_without_an_epoch_dates_need_a_prior_at_the_first_of_them(tmp_path):
 
 
 def test_seconds_past_an_epoch_of_the_file_become_those_past_the_problems(tmp_path):
+    named = read(tmp_path, "time[s past 2017-01-01T00:00:00 UTC],z\n-1,1\n0.125,2\n")
     tracking = read(tmp_path, "# epoch = 2017-01-01T00:00:00 UTC\ntime,z\n-1,1\n0.125,2\n")
+    assert same_tracking(named, tracking)
     assert_array_equal(tracking.row_times, [3600.0, 3601.125])
     assert tracking.epoch == EPOCH
 
@@ -246,7 +249,12 @@ def test_estimates_keep_the_epoch(tmp_path):
     with np.load(tmp_path / "e.npz") as found:
         assert_array_equal(found["epoch_tt"], [EPOCH.whole, EPOCH.fraction])
         assert str(found["epoch"]) == "2016-12-31T23:00:00 UTC"
-    assert "# epoch = 2016-12-31T23:00:00 UTC" in (tmp_path / "e.csv").read_text().splitlines()
+    frame = pd.read_csv(tmp_path / "e.csv")
+    assert frame.columns[0] == "time[s past 2016-12-31T23:00:00 UTC]" and frame.columns[-1] == "view"
+    assert_array_equal(frame.iloc[:, 1 : 1 + len(estimate.names)], estimate.mean)
+    pz.save(tmp_path / "t.csv", problem(EPOCH), tracking)
+    frame = pd.read_csv(tmp_path / "t.csv")
+    assert_array_equal(frame.iloc[:, 0], tracking.row_times)
 
 
 def test_the_founding_layout_keeps_the_epoch(tmp_path):

@@ -177,7 +177,7 @@ def _dataset(found: Any, path: Any) -> None:
     names = np.array(facts["names"], dtype=object)
     mean, root = solution(found)
     data = found.residuals.assign_coords(state=("state", names)).assign(
-        mean=("state", mean), covariance=(("state", "state_2"), root @ root.T)
+        state_mean=("state", mean), covariance=(("state", "state_2"), root @ root.T)
     )
     data = data.assign_attrs(determination=json.dumps(facts, allow_nan=False))
     with hdf5.written(path) as file:

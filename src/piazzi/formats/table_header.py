@@ -21,6 +21,7 @@ SIGMA = "sigma "
 MEASURED = tuple(kind for kind in KINDS if not KINDS[kind].auxiliary)
 KNOWN = (TIME, *PEOPLE, *KINDS, *(SIGMA + kind for kind in MEASURED))
 _LETTERS = re.compile(r"(\d{1,4})-(\d{1,4})", re.ASCII)  # columns of letters, from one to another
+_UNITS = re.compile(rb"\[[^\[\]\n]*\]")
 _CELLS = re.compile(rb"[,;\t]|\s+")
 
 
@@ -109,7 +110,8 @@ def looks(head: bytes) -> bool:
     """Whether the first bytes of a file are a header with a time and something that is measured."""
     for line in head.removeprefix(b"\xef\xbb\xbf").split(b"\n"):
         if line.strip() and not line.startswith(b"#"):
-            names = {parts(cell.decode("latin-1").strip(' "\r'))[0].casefold() for cell in _CELLS.split(line)}
+            cells = _CELLS.split(_UNITS.sub(b"", line))  # a unit may have blanks, as in time[s past DATE]
+            names = {parts(cell.decode("latin-1").strip(' "\r'))[0].casefold() for cell in cells}
             timed = TIME in names or {WEEK, SECONDS} <= names
             return timed and not names.isdisjoint(MEASURED)
     return False

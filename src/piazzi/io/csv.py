@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.io.atomic import atomic_path
-from piazzi.io.dates import EPOCH, has_weeks, times_of
+from piazzi.io.dates import has_weeks, times_of
 from piazzi.io.naming import TRUTH, fitting, named, own_names
 from piazzi.opening import RecordingWarning
 from piazzi.problem import Problem, Tracking
@@ -88,7 +88,7 @@ def write_csv(path: str | os.PathLike[str], problem: Problem, tracking: Tracking
         Where the tracking does not fit the problem, or a component is called like another column.
     """
     station, values = tracking.stations_of(problem), tracking.padded(problem.model.width)
-    header, columns = [TIME], [_written(tracking.row_times)]
+    header, columns = [_time(problem, tracking)], [_written(tracking.row_times)]
     if tracking.row_stations is not None:
         cells = {name: escape_formula(str(name)) for name in dict.fromkeys(np.asarray(tracking.row_stations).tolist())}
         header, columns = [*header, STATION], [*columns, [cells[name] for name in np.asarray(tracking.row_stations).tolist()]]
@@ -101,19 +101,20 @@ def write_csv(path: str | os.PathLike[str], problem: Problem, tracking: Tracking
     if len(set(header)) < len(header):
         twice = next(h for h in header if header.count(h) > 1)
         raise ValueError(f"two columns would be called {twice!r}: rename the component")
-    write_rows(path, header, columns, epoch_lines(problem, tracking))
+    write_rows(path, header, columns)
 
 
-def epoch_lines(problem: Problem, tracking: Tracking) -> list[str]:
-    """The comment that says what times are seconds of TT past; none where nothing is known of it."""
+def _time(problem: Problem, tracking: Tracking) -> str:
+    """What the column of times is called: with what they are seconds of TT past, where that is known."""
     epoch = epoch_of(problem, tracking)
-    return [] if epoch is None else [EPOCH + epoch.exact()]
+    return TIME if epoch is None else f"{TIME}[s past {epoch.exact()}]"
 
 
 def write_estimate_csv(path: str | os.PathLike[str], estimate: Estimate) -> None:
-    """Write a row for each epoch: time, means, standard deviations, and the covariances of every pair; raises OSError."""
+    """Write a row for each epoch: time, means, sigmas, the covariances of every pair, and the view; raises OSError."""
     names, P = estimate.names, estimate.covariance
-    header, columns = [TIME, *names], [_written(estimate.times), *(_written(estimate.mean[:, i]) for i in range(len(names)))]
+    time = _time(estimate.problem, estimate.tracking)
+    header, columns = [time, *names], [_written(estimate.times), *(_written(estimate.mean[:, i]) for i in range(len(names)))]
     for i, name in enumerate(names):
         header.append(f"sigma_{name}")
         columns.append(_written(np.sqrt(np.maximum(P[:, i, i], 0.0))))
@@ -121,16 +122,12 @@ def write_estimate_csv(path: str | os.PathLike[str], estimate: Estimate) -> None
         for j in range(i, len(names)):
             header.append(f"cov_{name}_{names[j]}")
             columns.append(_written(P[:, i, j]))
-    comments = [f"view = {estimate.view}", *epoch_lines(estimate.problem, estimate.tracking)]
-    write_rows(path, header, columns, comments)
+    write_rows(path, [*header, "view"], [*columns, [estimate.view] * len(estimate.times)])
 
 
-def write_rows(
-    path: str | os.PathLike[str], header: Sequence[str], columns: Sequence[Iterable[Any]], comments: Sequence[str] = ()
-) -> None:
+def write_rows(path: str | os.PathLike[str], header: Sequence[str], columns: Sequence[Iterable[Any]]) -> None:
     """Write columns under their names, whole or not at all; numbers are written such that they read back bit for bit."""
     with atomic_path(path) as work, open(work, "w", encoding="utf-8", newline="") as file:
-        file.writelines(f"# {line}\n" for line in comments)
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         rows = zip(*columns, strict=True)

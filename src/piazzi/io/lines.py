@@ -10,7 +10,7 @@ from piazzi.io.csv import cells_to_tracking
 from piazzi.io.dates import epoch_in
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
-from piazzi.tables.cells import STATION, TIME, dated, parse_header, parse_rows
+from piazzi.tables.cells import STATION, TIME, dated, parse_header, parse_rows, since
 
 if TYPE_CHECKING:
     from piazzi.earth import Epoch
@@ -41,8 +41,8 @@ class RowReader:
 
         `comments` stood above it; `scale` is that of dates that name none.
         """
-        header = parse_header(first, line)
-        reader = cls(problem, tuple(header), tuple(comments), scale)
+        header, said = since(parse_header(first, line))
+        reader = cls(problem, tuple(header), (*said, *comments), scale)
         example = parse_rows(_one_of_each(header, problem, reader.epoch), line, header, reader.comments)
         if example.dates is not None:
             reader.check_epoch(line)

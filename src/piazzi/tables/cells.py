@@ -26,6 +26,7 @@ _ODD = (b'"', b"\r", b"\0")
 _WORDS = (b"rue", b"RUE", b"alse", b"ALSE")  # true and false are numbers to pandas, but not to us
 PIECE = 2**18  # bytes that are looked at together: what stays in a cache
 LONGEST_DATE = 60
+_PAST = re.compile(r"time ?\[s past ([^\[\]]+)\]")
 _DATE = re.compile(r"\s*(\d{4}-\d|M?JD\s*\d)")
 SMALL = 2**19  # bytes for which the careful way takes less time than importing pandas
 
@@ -120,7 +121,8 @@ def cells_of(
     """
     comments, first, body, line, note = split(content)
     if header is None:
-        header, line = parse_header(first, line), line + 1
+        header, said = since(parse_header(first, line))
+        comments, line = (*said, *comments), line + 1
     else:
         body = first + b"\n" + body if body else first
     table = (body, line, header if named is None else named(header), comments, texts)
@@ -377,6 +379,12 @@ def _name(cell: str, column: str, line: int) -> str:
     if not cell.strip():
         raise ValueError(f"line {line}: the {column} has no name")
     return cell.strip()
+
+
+def since(header: list[str]) -> tuple[list[str], list[str]]:
+    """The header with ``time`` for ``time[s past DATE]``, and what a comment above the table would say of it."""
+    since = [(i, match[1]) for i, name in enumerate(header) if (match := _PAST.fullmatch(name))]
+    return [TIME if i in dict(since) else name for i, name in enumerate(header)], [f"epoch = {date}" for _, date in since]
 
 
 def _number(cell: str, name: str, line: int) -> float:
