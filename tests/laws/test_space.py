@@ -17,6 +17,7 @@ from piazzi.kernels.generate import model_source
 from piazzi.model.derivation import derive, derive_sensor
 from piazzi.model.functions import Signature
 from piazzi.outside.table import Table
+from piazzi.study.ensemble import Layout, filter_runs, simulate_runs
 
 SPIN, C = 7.292115e-5, 299792458.0
 TIMES = np.arange(-90000.0, 100000.0, 300.0)
@@ -238,6 +239,52 @@ def test_with_its_edge_as_an_event_they_agree_as_well(monkeypatch):
     sigma = np.sqrt(np.diagonal(one.covariance, axis1=1, axis2=2))
     assert np.abs((found["SlidingWindow"] - found["ExtendedKalmanFilter"]) / sigma).max() < 1e-3
     assert_allclose(found["Smoother"][-1], found["ExtendedKalmanFilter"][-1], rtol=1e-12)
+
+
+def parted(Q):
+    """The problem of degree 20 with the edge of its shadow as an event."""
+    whole = satellite(Q=Q)
+    return replace(whole, model=replace(whole.model, events={"shadow": "edge"}))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("Q", [0.0, 1e-10])
+def test_with_events_too_all_estimators_find_the_orbit_and_agree(Q):
+    problem, tracking = parted(Q), tracked(Q)
+    graph = pz.FactorGraph().estimate(problem, tracking)
+    estimators = [pz.ExtendedKalmanFilter(), pz.Smoother(), graph, pz.SlidingWindow(15), pz.UnscentedKalmanFilter()]
+    for estimator in [*estimators, pz.SquareRootKalmanFilter(), *([] if Q else [pz.BatchLeastSquares()])]:
+        found = graph if estimator is graph else estimator.estimate(problem, tracking)
+        assert found.success, found.message
+        sigma = np.sqrt(np.diagonal(found.covariance[-1]))
+        assert np.abs((found.mean[-1] - tracking.truth[-1]) / sigma).max() < 4.5
+        assert np.abs((found.mean[-1] - graph.mean[-1]) / sigma).max() < 0.5
+
+
+@pytest.mark.slow
+def test_with_events_too_sessions_windows_and_studies_are_what_they_are():
+    problem, tracking = parted(1e-10), tracked(1e-10)
+    whole = pz.ExtendedKalmanFilter().estimate(problem, tracking)
+    sigma = np.sqrt(np.diagonal(whole.covariance, axis1=1, axis2=2))
+    window = pz.SlidingWindow(1, iterations=1).estimate(problem, tracking)
+    assert np.abs((window.mean - whole.mean) / sigma).max() < 1e-4
+    live = pz.ExtendedKalmanFilter().start(problem)
+    for row, (t, station) in enumerate(zip(tracking.row_times, tracking.row_stations, strict=True)):
+        live.update(station, tracking.values[row], t)
+    assert_allclose(live.mean / sigma[-1], whole.mean[-1] / sigma[-1], atol=1e-9)
+    runs = simulate_runs(Layout(problem, tracking.times), problem, *drawn(problem, len(tracking.times), 9))
+    mean, _, scores = filter_runs(Layout(problem, tracking.times), runs[1], runs[0])
+    for r, (truth, z) in enumerate(zip(*runs, strict=True)):
+        alone = pz.ExtendedKalmanFilter().estimate(problem, replace(tracking, values=z, truth=truth))
+        assert np.abs((mean[r] - alone.mean[-1]) / np.sqrt(np.diagonal(alone.covariance[-1]))).max() < 1e-6
+    assert 2.0 < scores.nees.mean() < 12.0
+
+
+def drawn(problem, epochs, runs):
+    """First states of runs, and unit normal draws."""
+    rng, n = np.random.default_rng(5), problem.model.n
+    first = problem.mean + rng.standard_normal((runs, n)) * np.sqrt(np.diagonal(problem.covariance))
+    return first, rng.standard_normal((runs, epochs, n)), rng.standard_normal((runs, 2 * epochs, 1))
 
 
 @pytest.mark.slow
