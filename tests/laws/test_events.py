@@ -416,16 +416,19 @@ def test_a_study_runs(seen, tmp_path):
     assert stored.summary.lines[0].failed == 0
 
 
-def test_a_crossing_costs_the_step_to_it_and_one_more_to_find_it(monkeypatch):
-    """To 1e-9 of the step: the cubic's guess and one step of Newton's method; counted in steps of the method."""
+def test_a_crossing_costs_the_step_to_it_and_little_more(monkeypatch):
+    """To 1e-9 of the step: to the cubic's guess, and from there by short steps; counted in steps of the method."""
     monkeypatch.setenv("PIAZZI_JIT", "0")
     model = pz.Model(["x", "v"], {"x": "v", "v": "-x"}, definitions={"edge": "x - 0.3"}, events=("edge",))
     problem = pz.Problem(model, pz.Gaussian([1.0, 0.0], [1.0, 1.0]), None, integrator=pz.RungeKutta8(1), prior_time=0.0)
     inside = load_plain(problem.spec("transition", "propagate")).run_propagation._function.__globals__
     real, taken = inside["substep"], []
     monkeypatch.setitem(inside, "substep", lambda t, h, x, p: taken.append(t + h) or real(t, h, x, p))
+    over, beyond = inside["cross"], []
+    monkeypatch.setitem(inside, "cross", lambda t, x, e, p: beyond.append(t) or over(t, x, e, p))
     times, x = np.array([1.2, 1.3]), np.array([[np.cos(1.2), -np.sin(1.2)], [0.0, 0.0]])
     load_plain(problem.spec("transition", "propagate")).run_propagation(2, times, np.array([1, 1]), problem.given_bundle, x)
-    assert len(taken) == 4  # the whole step, where it is looked for, up to there, and the rest
-    assert abs(taken[2] - np.arccos(0.3)) < 1e-9 * 0.1
+    assert len(taken) == 3  # the whole step, nearly to the crossing, and the rest
+    assert 0.0 < abs(taken[1] - np.arccos(0.3)) < 1e-4 * 0.1
+    assert len(beyond) == 1 and abs(beyond[0] - np.arccos(0.3)) < 1e-9 * 0.1
     assert_allclose(x[1], [np.cos(1.3), -np.sin(1.3)], atol=1e-13)

@@ -100,6 +100,7 @@ doubled_of: Any
 joined: Any
 joined_of: Any
 dynamics_beside: Any
+rhs_beside: Any
 events_of: Any
 events_into: Any
 event_row: Any
@@ -126,6 +127,8 @@ side_of: Any
 lowest: Any
 is_clear: Any
 crossing: Any
+reach: Any
+reach_jacobian: Any
 cross: Any
 arrive: Any
 combined_error: Any

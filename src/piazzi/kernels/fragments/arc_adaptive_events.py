@@ -16,13 +16,13 @@ def propagate_arc(t, dt, count, x, p):
         h = dt - at if last else h
         y, error = trial(t + at, h, x, own)
         if error <= 1.0:
-            e, s = crossing(t + at, h, x, y, own)
+            e, s, many = crossing(t + at, h, x, y, own)
             if e < 0:
                 arrive(own)
                 x = y
                 at += h
             else:
-                x = y if s == 1.0 else substep(t + at, s * h, x, own)
+                x, s = reach(e, s, many, t + at, h, x, y, own)
                 at += s * h
                 cross(t + at, x, e, own)
             if last and (e < 0 or fabs(dt - at) <= 1e-15 * fabs(dt)):
@@ -46,14 +46,13 @@ def propagate_arc_jacobian(t, dt, count, x, R, p):
         h = dt - at if last else h
         y, S, error = trial_jacobian(t + at, h, x, R, own)
         if error <= 1.0:
-            e, s = crossing(t + at, h, x, y, own)
+            e, s, many = crossing(t + at, h, x, y, own)
             if e < 0:
                 arrive(own)
                 x, R = y, S
                 at += h
             else:
-                if s < 1.0:
-                    y, S = substep_jacobian(t + at, s * h, x, R, own)
+                y, S, s = reach_jacobian(e, s, many, t + at, h, x, R, y, S, own)
                 at += s * h
                 jump, row = cross(t + at, y, e, own)
                 x, R = y, jumped(S, jump, row @ complete(S))

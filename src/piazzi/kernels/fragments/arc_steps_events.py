@@ -10,11 +10,11 @@ def cut_step(t, h, x, p):
     for _ in range(64):
         left = h - done
         y = substep(t + done, left, x, p)
-        e, s = crossing(t + done, left, x, y, p)
+        e, s, many = crossing(t + done, left, x, y, p)
         if e < 0:
             arrive(p)
             return y
-        x = y if s == 1.0 else substep(t + done, s * left, x, p)
+        x, s = reach(e, s, many, t + done, left, x, y, p)
         done += s * left
         cross(t + done, x, e, p)
         if fabs(h - done) <= 1e-15 * fabs(h):
@@ -29,12 +29,11 @@ def cut_step_jacobian(t, h, x, R, p):
     for _ in range(64):
         left = h - done
         y, S = substep_jacobian(t + done, left, x, R, p)
-        e, s = crossing(t + done, left, x, y, p)
+        e, s, many = crossing(t + done, left, x, y, p)
         if e < 0:
             arrive(p)
             return y, S
-        if s < 1.0:
-            y, S = substep_jacobian(t + done, s * left, x, R, p)
+        y, S, s = reach_jacobian(e, s, many, t + done, left, x, R, y, S, p)
         done += s * left
         jump, row = cross(t + done, y, e, p)
         x, R = y, jumped(S, jump, row @ complete(S))

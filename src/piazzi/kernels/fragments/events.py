@@ -100,23 +100,39 @@ def is_clear(start, end, at, sides, clock):
     return clear
 
 
-@outlined
-def located(e, t, h, x, p, high):
-    """The fraction of the step at which the orbit passes event e, before the one at which it is beyond: by Newton's method."""
+@inline
+def cubic(e, h, p, high):
+    """The value of event e at `high`, and the polynomial through values and rates there and at the start, in parts of it."""
     side, last = p.sides[e], (2 if high == 1.0 else 4) * EVENTS + e
     a, b = side * p.work[e], side * h * high * p.work[e + EVENTS]
     c, d = side * p.work[last], side * h * high * p.work[last + EVENTS]
+    return c, a, b, 3.0 * (c - a) - 2.0 * b - d, 2.0 * (a - c) + b + d
+
+
+@outlined
+def foretold(e, h, p, high):
+    """The fraction of the step at which that polynomial passes event e, before the one at which the orbit is beyond it."""
+    c, a, b, second, third = cubic(e, h, p, high)
     if c > 0.0:  # as good as there
         return high
-    second, third = 3.0 * (c - a) - 2.0 * b - d, 2.0 * (a - c) + b + d
     low, top = 0.0, 1.0
-    for _ in range(30):  # of the cubic through values and rates at both ends
+    for _ in range(30):
         s = 0.5 * (low + top)
         if a + s * (b + s * (second + s * third)) > 0.0:
             low = s
         else:
             top = s
-    s, low, width = high * 0.5 * (low + top), 0.0, high
+    return high * 0.5 * (low + top)
+
+
+@outlined
+def located(e, t, h, x, p, high):
+    """The fraction at which the orbit passes it: by Newton's method, each time by a step from the start."""
+    _, _, _, second, third = cubic(e, h, p, high)
+    side, low, width = p.sides[e], 0.0, high
+    s = foretold(e, h, p, high)
+    if s == high:
+        return high
     for _ in range(60):
         events_into(t + s * h, substep(t, s * h, x, p), p, 4 * EVENTS)
         value, rate = side * p.work[4 * EVENTS + e], side * h * p.work[5 * EVENTS + e]
@@ -136,16 +152,101 @@ def located(e, t, h, x, p, high):
 
 @outlined
 def crossing(t, h, x, y, p):
-    """The first event on the way from x to y, -1 where there is none, and at which fraction of the step."""
+    """The first event on the way from x to y, -1 where there is none, at which fraction of the step, and how many there are.
+
+    Of one alone as it is foretold, which `reach` mends.
+    """
     events_into(t + h, y, p, 2 * EVENTS)
-    event, first = -1, 2.0
+    event, first, many = -1, 2.0, 0
     for e in range(EVENTS):
         s = passes(e, t, h, x, p)
         if s <= 1.0:
-            s = located(e, t, h, x, p, s)
-            if s < first:
-                event, first = e, s
-    return event, first
+            event, first = e, foretold(e, h, p, s)
+            many += 1
+    if many > 1:
+        first = 2.0
+        for e in range(EVENTS):
+            s = passes(e, t, h, x, p)
+            if s <= 1.0:
+                s = located(e, t, h, x, p, s)
+                if s < first:
+                    event, first = e, s
+    return event, first, many
+
+
+@inline
+def offset(e, t, h, moved, x, p):
+    """Seconds from a state near event e to the event; not a number where that is not near enough to where it was looked for."""
+    events_into(t, x, p, 4 * EVENTS)
+    value, rate = p.work[4 * EVENTS + e], p.work[5 * EVENTS + e]
+    step = -value / rate if fabs(rate) > 0.0 else inf
+    return step if fabs(moved + step) <= 1e-4 * fabs(h) else nan
+
+
+@outlined
+def nudged(e, t, h, x, p):
+    """The state on event e, by short steps of the midpoint rule from one near it, and how many seconds that took."""
+    moved = 0.0
+    for _ in range(4):
+        step = offset(e, t + moved, h, moved, x, p)
+        middle = x + (0.5 * step) * dynamics_beside(t + moved, x, p)
+        x = x + step * dynamics_beside(t + moved + 0.5 * step, middle, p)
+        moved += step
+        if not fabs(step) > 1e-7 * fabs(h):  # what Newton's method leaves is its square
+            return x, moved
+    return x, nan
+
+
+@outlined
+def nudged_jacobian(e, t, h, x, R, p):
+    """The same with the derivative times the rows `R`."""
+    moved = 0.0
+    for _ in range(4):
+        step = offset(e, t + moved, h, moved, x, p)
+        f, F = rhs_beside(t + moved, x, R, p)
+        f, F = rhs_beside(t + moved + 0.5 * step, x + (0.5 * step) * f, R + (0.5 * step) * F, p)
+        x, R = x + step * f, R + step * F
+        moved += step
+        if not fabs(step) > 1e-7 * fabs(h):
+            return x, R, moved
+    return x, R, nan
+
+
+@outlined
+def reach(e, s, many, t, h, x, y, p):
+    """The state where the step from x to y passes event e, about at the fraction s, and that fraction.
+
+    A step that reaches beyond the event sees a bend there, so this one ends a little before.
+    """
+    if s == 1.0:
+        return y, s
+    before = maximum(s - 0.5e-4, 0.5 * s) if many == 1 else s
+    z = substep(t, before * h, x, p)
+    if many == 1:
+        z, moved = nudged(e, t + before * h, h, z, p)
+        after = before + moved / h
+        if 0.0 <= after <= 1.0:
+            return z, after
+        s = located(e, t, h, x, p, passes(e, t, h, x, p))
+        z = substep(t, s * h, x, p)
+    return z, s
+
+
+@outlined
+def reach_jacobian(e, s, many, t, h, x, R, y, S, p):
+    """The same with the derivative times the rows `R`, which is `S` at the end of the step."""
+    if s == 1.0:
+        return y, S, s
+    before = maximum(s - 0.5e-4, 0.5 * s) if many == 1 else s
+    z, Z = substep_jacobian(t, before * h, x, R, p)
+    if many == 1:
+        z, Z, moved = nudged_jacobian(e, t + before * h, h, z, Z, p)
+        after = before + moved / h
+        if 0.0 <= after <= 1.0:
+            return z, Z, after
+        s = located(e, t, h, x, p, passes(e, t, h, x, p))
+        z, Z = substep_jacobian(t, s * h, x, R, p)
+    return z, Z, s
 
 
 @inline

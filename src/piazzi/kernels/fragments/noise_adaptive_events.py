@@ -17,11 +17,11 @@ def propagate_arc_noise(t, dt, count, x, R, p, Q, scale):
         h = dt - at if last else h
         y, S, error = trial_jacobian(t + at, h, x, R, own)
         if error <= 1.0:
-            e, s = crossing(t + at, h, x, y, own)
+            e, s, many = crossing(t + at, h, x, y, own)
+            if e >= 0:
+                y, S, s = reach_jacobian(e, s, many, t + at, h, x, R, y, S, own)
             part = h if e < 0 else s * h
             Q_step, _ = propagate_noise(Q_step, t + at, part, x, Q, own)
-            if e >= 0 and s < 1.0:
-                y, S = substep_jacobian(t + at, part, x, R, own)
             at += part
             if e < 0:
                 arrive(own)
