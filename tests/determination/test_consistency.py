@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from piazzi.determination import density
+from piazzi.determination.approach import approached
+from piazzi.determination.density import with_density
 from piazzi.determination.orbit_forces import AirVaries, air_varies
+from piazzi.determination.physical import nodes_of, said
 from piazzi.determination.setup import follow
-from tests.references.determinations import AIR, KINDS, begun, consistency, within
+from piazzi.estimate.chi_square import quantile
+from tests.references.determinations import AIR, KINDS, begun, consistency, drawn, predictions, within
 
 
 @pytest.mark.slow
@@ -26,6 +30,51 @@ def test_density_varies_more_where_the_sun_matters_more_and_less_where_its_activ
     assert air_varies(550e3, True).sigma == pytest.approx(0.5 * middle)
 
 
+@pytest.fixture(scope="module")
+def low():
+    """A low orbit whose coefficient of drag is estimated, with measurements."""
+    return drawn(AIR, begun(AIR), 1)[0]
+
+
+@pytest.mark.slow
+def test_density_is_a_gauss_markov_process_at_its_nodes(low):
+    """Covariances of what results call density, from its law: sigma^2 exp(-|lag| / time)."""
+    given = with_density(approached(low))
+    varies, names = given.chosen.air_varies, given.problem.model.names
+    where = [i for i, name in enumerate(names) if name.startswith("air_")]
+    J = said(given.problem, given.problem.mean)[1]
+    P = (J @ given.problem.covariance @ J.T)[np.ix_(where, where)]
+    t = np.array([when - given.measured.epoch for when in nodes_of(given.problem)])
+    law = varies.sigma**2 * np.exp(-np.abs(np.subtract.outer(t, t)) / varies.time)
+    np.testing.assert_allclose(P, law, rtol=1e-12)
+    np.testing.assert_allclose([t[0], t[-1]], given.tracking.times[[0, -1]], atol=1e-6)
+    assert sum("is estimated at 8 times" in text for text in given.assumed) == 1
+    # between nodes it is linear, and it goes back to the model's outside: by the rate of a coefficient that is as much larger
+    mean = given.problem.mean.copy()
+    mean[:6], mean[where] = low.states[0][:6], np.random.default_rng(0).standard_normal(len(where))
+    nodes = said(given.problem, mean)[0][where]
+    for when in (t[2] + 0.25 * (t[3] - t[2]), t[0] - 7200.0, t[-1] + 7200.0):
+        inside = np.interp(when, t, nodes) * np.exp(-max(t[0] - when, when - t[-1], 0.0) / varies.time)
+        other = given.problem.mean.copy()
+        other[:6], other[names.index("cd_a_m_log")] = mean[:6], inside
+        np.testing.assert_allclose(given.problem.dynamics(mean, when), given.problem.dynamics(other, when), rtol=1e-13)
+
+
+@pytest.mark.slow
+def test_density_is_left_as_the_model_has_it_where_drag_hardly_moves_the_orbit(low):
+    near = approached(low)
+    weak = replace(near, problem=replace(near.problem, parameters={**near.problem.parameters, "cd_a_m": 1e-9}))
+    assert with_density(weak) is weak
+    said_by_user = replace(near, chosen=replace(near.chosen, air_varies=None))
+    assert with_density(said_by_user) is said_by_user
+
+
+@pytest.mark.slow
+def test_predictions_through_a_density_that_varies_are_as_good_as_they_say():
+    found = predictions(AIR, 6, days=(1, 3))
+    assert found.mean(axis=0).max() < quantile(0.9999, 6) / 6, found.mean(axis=0)
+
+
 @pytest.mark.slow
 def test_a_departure_that_never_ends_is_a_wrong_coefficient():
     """With an infinite time the departure multiplies the coefficient: its effect is the derivative by it, once over."""
@@ -38,8 +87,8 @@ def test_a_departure_that_never_ends_is_a_wrong_coefficient():
 
     given = replace(given, chosen=replace(given.chosen, air_varies=AirVaries(0.1, 1e15)))
     found = density.departure(given, Estimate, t)
-    place = given.problem.model.names.index("cd_a_m")
+    place = given.problem.model.names.index("cd_a_m_log")
     Phi = follow(given.problem, np.array([last, *t[1:]]), first, given.chosen.max_step)[1]
-    by = (Phi[1] @ Phi[0])[:6, place] * first[place] * 0.1
+    by = (Phi[1] @ Phi[0])[:6, place] * 0.1
     assert not found[0].any()
     np.testing.assert_allclose(found[2], np.outer(by, by), rtol=1e-4, atol=1e-4 * np.abs(np.outer(by, by)).max())

@@ -44,6 +44,21 @@ def test_two_halves_say_what_one_fit_says(chain):
     assert_allclose(ratio, 1.0, rtol=0.02 + 0.05 * edits)
 
 
+def test_constants_go_on_with_their_correlations(noisy):
+    """What the first half says of sunlight is correlated with its orbit: with both, two halves say what one fit says."""
+    forces = KNOWN.removesuffix(" cr_a_m=0.023")
+    whole = pz.determine(observations(noisy, T, SIGMA), forces=forces)
+    first = pz.determine(observations(noisy[HALF], T[HALF], SIGMA), forces=forces)
+    then = pz.determine(observations(noisy, T, SIGMA), forces=forces, prior=first)
+    for found in (whole, then):
+        assert found.determined, found.message
+    one, two = (found.to_dict() for found in (whole, then))
+    sigma, miss = np.array(one["sigma"]), np.array(two["mean"]) - np.array(one["mean"])
+    edits = max(int((~found.keep).sum()) for found in (whole, first, then))
+    assert two["names"] == one["names"] and np.max(np.abs(miss) / sigma) < 0.05 + 0.3 * edits
+    assert_allclose(two["sigma"], sigma, rtol=0.02 + 0.05 * edits)
+
+
 def test_what_was_used_is_left_out_and_counted(chain):
     _, first, then = chain
     facts = then.to_dict()

@@ -1,16 +1,14 @@
 """The words of --estimate, --consider and --manoeuvre, and what becomes of them."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 import piazzi as pz
 from piazzi.determination.burns import Burn, burns_of
-from piazzi.determination.physical import physical
+from piazzi.determination.motion import Extra, Numbers
+from piazzi.determination.physical import at_rest, believed, by_logarithms, said, said_name
 from piazzi.determination.ramps import RAMP, pieces, profiles
-from piazzi.determination.unknowns import Label, asked, considered, listed
-from piazzi.determination.verdict import Sentence
+from piazzi.determination.unknowns import asked, considered, listed
 from piazzi.outside.function import Function
 
 WHEN = "2026-11-03T04:12:00Z"
@@ -170,15 +168,52 @@ def test_manoeuvres_of_messages(tmp_path):
     assert (second.dv, second.axes, second.duration) == ((0.0, 1.0, 0.0), "RTN", 0.0)
 
 
-def test_a_negative_coefficient_is_a_fault_of_the_model():
-    names = ("x", "cd_a_m_1", "cd_a_m_2", "cd_a_m_change")
-    given = SimpleNamespace(
-        problem=SimpleNamespace(model=SimpleNamespace(names=names)), solution=0, labels={"cd_a_m_2": Label("cd/12h/2", "")}
+def uncertain():
+    """A problem of one state with coefficients as determinations have them."""
+    numbers = Numbers(
+        {"cd_a_m": "estimated", "cr_a_m": "considered"},
+        {"cd_a_m": pz.Gaussian(0.02, 0.01**2), "cr_a_m": pz.Gaussian(0.013, 0.0013**2)},
     )
-    good = Sentence(True, 1.0, "size", "Honest.")
-    for value, ok in ((0.01, True), (-0.01, False)):
-        found = physical(given, SimpleNamespace(mean=np.array([[-1.0, 0.02, value, -0.3]])), good)
-        assert found.ok is ok and ("cd/12h/2 came out negative" in found.sentence) is not ok
+    definitions = {"pull": "cd_a_m*x + cr_a_m"}
+    extra = by_logarithms(numbers, Extra(), definitions)
+    model = pz.Model(
+        ("x",), {"x": "pull"}, pz.Sensor("s", {"z": "x"}), [pz.Parameter(n, r) for n, r in numbers.roles.items()],
+        definitions=definitions | dict(extra.definitions),
+    )  # fmt: skip
+    return pz.Problem(model, pz.Gaussian([1.0], [1.0]), stations=[pz.Station("a", "s", [1.0])], parameters=numbers.values)
+
+
+def test_coefficients_are_positive_whatever_is_estimated():
+    problem = uncertain()
+    assert problem.model.names == ("x", "cd_a_m_log") and problem.considered == ("cr_a_m_log",)
+    for value in (-3.0, 0.0, 2.0):
+        mean = np.array([5.0, value])
+        said_mean, J = said(problem, mean)
+        assert said_mean[1] == pytest.approx(0.02 * np.exp(value)) and said_mean[1] > 0 and said_mean[0] == 5.0
+        near = said(problem, np.array([5.0, value + 1e-6]))[0] - said(problem, np.array([5.0, value - 1e-6]))[0]
+        np.testing.assert_allclose(J[:, 1], near / 2e-6, rtol=1e-6)
+        assert problem.dynamics(mean, 0.0)[0] == pytest.approx(5.0 * said_mean[1] + 0.013)
+    # one sigma is a factor of 1 + share either way
+    assert believed(problem, "cd_a_m_log") == pytest.approx((0.02, 0.02 * np.log(1.5)))
+    assert believed(problem, "cr_a_m_log") == pytest.approx((0.013, 0.013 * np.log(1.1)))
+    assert [said_name(n) for n in ("cd_a_m_2_log", "cd_a_m_change", "air_3", "range_log")] == [
+        "cd_a_m_2", "cd_a_m_change", "density_3", "range_log",
+    ]  # fmt: skip
+
+
+def test_a_coefficient_of_nothing_cannot_be_estimated():
+    numbers = Numbers({"cd_a_m": "estimated"}, {"cd_a_m": pz.Gaussian(0.0, 1.0)})
+    with pytest.raises(ValueError, match="cd_a_m is 0 before the measurements"):
+        by_logarithms(numbers, Extra(), {"pull": "cd_a_m*x"})
+
+
+def test_constants_at_rest_are_states_with_the_same_numbers():
+    problem = uncertain()
+    moved = at_rest(problem, ["cd_a_m_log"])
+    assert moved.model.states == ("x", "cd_a_m_log") and moved.model.names == problem.model.names
+    np.testing.assert_array_equal(moved.covariance, problem.covariance)
+    np.testing.assert_array_equal(moved.mean, problem.mean)
+    assert moved.dynamics(moved.mean, 0.0)[1] == 0.0 and moved.is_noise_free
 
 
 def test_values_for_parts_of_the_time_change_over_a_ramp():

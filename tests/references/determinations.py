@@ -14,8 +14,7 @@ import numpy as np
 import piazzi as pz
 from piazzi import earth
 from piazzi.determination import Guess
-from piazzi.determination.approach import approached
-from piazzi.determination.determining import prepared, solved
+from piazzi.determination.determining import prepared, ready, solved
 from piazzi.determination.fit import estimators
 from piazzi.determination.setup import follow
 from piazzi.earth.tabulated import Place
@@ -142,7 +141,7 @@ def consistency(kind, count, first=0, given=None):
     out = []
     for seed in range(first, first + count):
         one, truth = drawn(kind, given, seed)
-        found = solved(approached(one), estimators(("graph",)))
+        found = solved(ready(one), estimators(("graph",)))
         k = one.solution
         error, P = found.estimate.mean[k] - truth[k], found.estimate.covariance[k]
         scale = np.sqrt(np.diag(P))
@@ -161,13 +160,13 @@ PIECE = 3600.0  # s, in which the density of a truth keeps to its share
 
 
 def flown(given, first, times, share):
-    """States (K, n) of an orbit whose coefficient of drag is multiplied by 1 + share, another in each hour."""
-    place = given.problem.model.names.index("cd_a_m")
+    """States (K, n) of an orbit whose coefficient of drag is multiplied by exp(share), another in each hour."""
+    place = given.problem.model.names.index("cd_a_m_log")
     out, x, t, mean = [], first.copy(), float(times[0]), first[place]
     for k, part in enumerate(share):
         end = min(PIECE * (k + 1), float(times[-1]))
         inside = times[(times > t) & (times <= end)]
-        x[place] = mean * (1.0 + part)
+        x[place] = mean + part
         nodes = np.unique(np.concatenate([[t], inside, [end]]))
         states = follow(given.problem, nodes, x, given.chosen.max_step)[0]
         out.append(states[np.isin(nodes, inside if k else np.concatenate([times[:1], inside]))])
@@ -195,12 +194,12 @@ def predictions(kind, count, other=None, days=(1, 2, 3), first=0):
             share[k] = left * share[k - 1] + 0.32 * np.sqrt(1 - left**2) * rng.standard_normal()
         start = truth.states[0].copy()
         start[:6] += np.repeat(kind.off, 3) * rng.standard_normal(6)
-        start[names.index("cd_a_m")] = 0.02 * (1 + 0.3 * rng.standard_normal())
+        start[names.index("cd_a_m_log")] = 0.3 * rng.standard_normal()
         states = flown(truth, start, times, share if other is None else 0.0 * share)
         z = predicted(truth.problem, prepare(truth.problem, truth.tracking), states[: len(rows)])
         z = z + kind.sigma * rng.standard_normal(z.shape)
         tracking = pz.Tracking(given.tracking.row_times, z, given.tracking.row_stations, epoch=given.tracking.epoch)
-        found = solved(approached(replace(given, tracking=tracking)), estimators(("graph",)))
+        found = solved(ready(replace(given, tracking=tracking)), estimators(("graph",)))
         each = []
         for k, t in enumerate(ahead.tolist()):
             when = given.measured.epoch + t

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
-from piazzi.determination.setup import Setup
+from piazzi.determination.earlier import root_of
+from piazzi.determination.setup import Setup, follow
 from piazzi.estimate.batch import undisturbed
 from piazzi.evaluate.information import NEGLIGIBLE, along, factor, predicted
 from piazzi.problem.checks import Array
@@ -59,6 +61,12 @@ class Analysis:
         return np.linalg.lstsq(root, turned, rcond=NEGLIGIBLE)[0], float(np.linalg.norm(turned))
 
 
+def of_orbit(root: Array) -> Array:
+    """Root (6, 6) of the information on position and velocity where nothing but `root` is known of what stands behind them."""
+    whole = np.asarray(np.linalg.qr(np.hstack([root[:, 6:], root[:, :6]]), mode="r"))
+    return whole[-6:, -6:]
+
+
 def analysed(given: Setup, states: Array) -> Analysis:
     """Of states (K, n) at all epochs, as one orbit without process noise."""
     problem = given.problem if given.problem.is_noise_free else undisturbed(given.problem)
@@ -75,9 +83,7 @@ def analysed(given: Setup, states: Array) -> Analysis:
     residual = np.where(full, apart, shot.innovations * sigma)
     rows = shot.rows.reshape(J, m, -1)
     if given.before is not None:
-        mean, root = given.before
-        own = np.linalg.solve(root, np.eye(len(mean)))
-        return Analysis(residual, inputs.z - apart, shot.innovations, rows, own, own @ (mean - states[0]))
+        return Analysis(residual, inputs.z - apart, shot.innovations, rows, *_known_before(given, given.before, states[0]))
     constants = 6  # and processes, of which as much is known
     spread = np.sqrt(np.diag(problem.covariance))[constants:]
     known = np.flatnonzero(spread > 0)
@@ -85,3 +91,22 @@ def analysed(given: Setup, states: Array) -> Analysis:
     prior[np.arange(len(known)), constants + known] = 1.0 / spread[known]
     miss = (states[0, constants:] - problem.mean[constants:])[known] / spread[known]
     return Analysis(residual, inputs.z - apart, shot.innovations, rows, prior, -miss)
+
+
+def _known_before(given: Setup, before: tuple[Array, Array], first: Array) -> tuple[Array, Array]:
+    """Rows (n, n) that an earlier orbit is worth, by the first state, and how far the solution is from it, in its sigmas.
+
+    Without process noise it is compared where it stands, because what it was uncertain by may have grown beyond a straight
+    line until the first measurement.
+    """
+    problem, begun = given.problem, float(given.tracking.times[0])
+    mean, root = before
+    then, J = first, np.eye(len(first))
+    gap = begun - float(begun if problem.prior_time is None else problem.prior_time)
+    if problem.is_noise_free and gap > 0.0:
+        step = given.chosen.max_step
+        path, Phi = follow(problem, np.linspace(begun, begun - gap, ceil(gap / step) + 1), first, step)
+        mean, root, then = problem.mean, root_of(problem.covariance), path[-1]
+        for one in Phi:
+            J = one @ J
+    return np.linalg.solve(root, J), np.linalg.solve(root, mean - then)

@@ -69,6 +69,21 @@ def approached(given: Setup) -> Setup:
         half *= 2.0
 
 
+def refined(given: Setup) -> Setup:
+    """The same of a set-up that is near but for unknowns that it has got since: over all measurements at once."""
+    if given.before is not None:
+        return given
+    times = given.tracking.times
+    begun = float(np.clip(given.guess.epoch - given.measured.epoch, times[0], times[-1]))
+    first = _state_at(given, begun)
+    here = _place(given, begun, first)
+    if here is None:
+        return given
+    before = np.concatenate([first[:6], given.problem.mean[6:]])
+    here = _fitted(given, begun, here, np.ones(len(given.rows), dtype=np.bool_), scale_of(given, first), before, LONG)
+    return with_prior(given, here.states, _wide(given, here))
+
+
 def _wide(given: Setup, here: Place) -> Array:
     """Covariance (s, s) of a prior of states, `WIDER` than what the measurements leave, and nowhere wider than a guess.
 

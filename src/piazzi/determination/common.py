@@ -12,7 +12,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis, analysed
 from piazzi.determination.instruments import pass_of_rows, with_instruments
-from piazzi.determination.setup import Setup, posed
+from piazzi.determination.setup import Setup, renewed
 from piazzi.determination.unknowns import PASS, Asked, Estimated
 from piazzi.estimate.chi_square import quantile
 from piazzi.problem.checks import Array
@@ -42,17 +42,8 @@ def with_common_errors(given: Setup) -> Setup:
 def with_pass_biases(given: Setup) -> Setup:
     """The set-up with a bias of ranges for each pass; its prior and states are otherwise as they were."""
     seen = with_instruments(given.measured, [Asked(Estimated("bias.range", PASS, LASER), "estimated", "--estimate")])
-    problem = replace(
-        posed(seen, given.chosen, given.guess),
-        prior=given.problem.prior, prior_time=given.problem.prior_time, manoeuvres=given.problem.manoeuvres,
-    )  # fmt: skip
-    old = {name: i for i, name in enumerate(given.problem.model.names)}
-    states = np.tile(problem.mean, (len(given.states), 1))
-    for i, name in enumerate(problem.model.names):
-        if name in old:
-            states[:, i] = given.states[:, old[name]]
     text = f"a bias of each pass is estimated, before the measurements 0 +- {LASER:g} m ({SOURCE}), as residuals show some"
-    return replace(given, measured=seen, problem=problem, states=states, assumed=(*given.assumed, text))
+    return replace(renewed(given, seen, given.chosen), assumed=(*given.assumed, text))
 
 
 def together(given: Setup, analysis: Analysis, rows: Array) -> tuple[float, int] | None:

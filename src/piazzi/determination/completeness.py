@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.analysis import Analysis
+from piazzi.determination.analysis import Analysis, of_orbit
 from piazzi.determination.setup import Setup, follow, scale_of
 from piazzi.earth import Gravity
 from piazzi.evaluate.information import along, singular
@@ -34,7 +34,7 @@ def truncated(given: Setup, states: Array, analysis: Analysis, keep: Array) -> t
     larger = replace(given.problem, functions={**given.problem.functions, "field": replace(field, degree=more)})
     unit = scale_of(given, states[0])
     root = analysis.information(keep, unit)
-    if not singular(root)[0][-1] > 1.0:
+    if not singular(of_orbit(root))[0][-1] > 1.0:
         return None
     inputs, times, step = prepare(given.problem, given.tracking), given.tracking.times, given.chosen.max_step
     with np.errstate(all="ignore"):  # whitened; by the same sensors: the field is the orbit's

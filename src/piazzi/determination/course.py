@@ -16,6 +16,7 @@ import numpy as np
 
 from piazzi.determination.beliefs import beliefs, carried_to
 from piazzi.determination.centres import EARTH, Centre, centre_of
+from piazzi.determination.earlier import density_now
 from piazzi.determination.guesses import CARTESIAN, SCHEMA, Guess, guess_of
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
 from piazzi.determination.sun_forces import forces_about_the_sun
@@ -151,17 +152,18 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
         names = [str(name) for name in facts["names"]]
         P, mean = np.array(facts["covariance"], dtype=float), np.array(facts["mean"], dtype=float)
         said = {**facts["forces"]}
-        constants = {str(one["name"]): (float(one["value"]), float(one["sigma"])) for one in facts["estimated"]}
+        constants = {str(one["name"]) for one in facts["estimated"]}
         frame, name = str(facts["frame"]), str(facts.get("object") or "")
     except (KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{source}: the determination is not whole: {' '.join(str(error).split())}") from None
     if not (np.isfinite(P).all() and P.shape == (len(names), len(names)) and np.isfinite(mean).all()):
         raise ValueError(f"{source}: the determination has no finite covariance")
     chosen = _chosen(_forces_of(said, source, guess.about), guess.state, name, guess.about)
+    mean, P = _with_density(facts, names, mean, P, guess.epoch)
     own = [p for p in chosen.forces.parameters if p in constants and p in names]
     roles = {p: role for p, role in chosen.roles.items() if p in own} | dict.fromkeys(own, "estimated")
     values: dict[str, Any] = {**_numbers(chosen)}
-    values |= {p: Gaussian(constants[p][0], max(constants[p][1], 1e-300) ** 2) for p in own}
+    values |= {p: Gaussian(mean[names.index(p)], max(P[names.index(p), names.index(p)], 1e-300)) for p in own}
     problem = _problem(chosen, roles, values, guess.epoch, guess.state, np.zeros((6, 6)), name)
     order = [names.index(p) for p in (*CARTESIAN, *problem.model.constants)]
     J = np.eye(len(order))
@@ -176,6 +178,18 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
 def _chosen(forces: Any, state: Array, name: str, about: str) -> Chosen:
     """The forces on a state."""
     return forces_about_the_sun(forces, state) if about == "sun" else chosen_forces(forces, state, name=name)
+
+
+def _with_density(facts: Mapping[str, Any], names: list[str], mean: Array, P: Array, epoch: Epoch) -> tuple[Array, Array]:
+    """Means and their covariance with the air's density at the epoch, where it was estimated, in the coefficient of drag."""
+    now = density_now(facts, epoch)
+    if now not in names or "cd_a_m" not in names:
+        return mean, P
+    drag, air = names.index("cd_a_m"), names.index(now)
+    J, mean = np.eye(len(names)), mean.copy()
+    mean[drag] *= np.exp(mean[air])
+    J[drag, drag], J[drag, air] = np.exp(mean[air]), mean[drag]
+    return mean, J @ P @ J.T
 
 
 def _forces_of(said: Mapping[str, Any], source: str, about: str) -> Forces:

@@ -1,50 +1,110 @@
-"""How far the density of the air departs from that of a fit once nothing is measured any more.
+"""How far the density of the air departs from that of its model: over the measurements, and behind them.
 
-A coefficient of drag takes up what the density is off by over the measurements.  Behind them it goes on to vary with the Sun
-and the geomagnetic field, so that a prediction is worse than the fit alone says.  The departure is a first-order Gauss-Markov
-process, whose effect is carried along the orbit by the derivatives of the state by the coefficient.
+Density varies with the Sun and the geomagnetic field in ways that no model follows.  The logarithm of what it departs by is a
+first-order Gauss-Markov process.  Where drag moves an orbit by more than a tenth of what its measurements leave open, the
+process is estimated: its values at nodes that are equally far apart, from the first measurement or the orbit of before to the
+last, are made of independent numbers of unit variance, and between them it is linear.  An orbit stays one arc so, which the
+first state and constants determine.  Behind the last node its mean goes back to zero, and what it may have become meanwhile is
+added to covariances by the derivatives of the state by the coefficient of drag.
 """
 
 from __future__ import annotations
 
-from math import exp
-from typing import NamedTuple
+from dataclasses import replace
+from math import exp, sqrt
 
 import numpy as np
 
-from piazzi.determination.setup import Setup, follow
+from piazzi.determination.analysis import analysed
+from piazzi.determination.motion import Extra, instead
+from piazzi.determination.orbit_forces import AirVaries, Chosen
+from piazzi.determination.physical import AIR, DENSITY
+from piazzi.determination.setup import Setup, follow, renewed
+from piazzi.determination.unknowns import Label
 from piazzi.estimate.estimator import Estimate
+from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
 
-NODES = 20.0  # parts of the process's time, in each of which it is constant
+COUNT = 8  # nodes over the measurements, however long these are: another number would compile other kernels
+SMALL = 0.1  # of a sigma, by which drag may move the solution before the density counts
+PARTS = 20.0  # of the process's time behind the measurements, in each of which it is constant
+COEFFICIENT = "cd_a_m_log"
 
 
-class Column(NamedTuple):
-    """Where the constant that drag goes by at the end stands, and its value."""
+def with_density(given: Setup) -> Setup:
+    """The set-up with the density as an unknown, where drag matters and the user says nothing of how it varies.
 
-    place: int
-    value: float
+    Its states are those of the set-up, with the density as the model has it.
+    """
+    varies, names = given.chosen.air_varies, given.problem.model.names
+    if varies is None or COEFFICIENT not in names or not np.isfinite(given.states).all():
+        return given
+    first, last = _span(given)
+    moved = analysed(given, given.states).rows[..., names.index(COEFFICIENT)]
+    if not (last > first and np.linalg.norm(np.nan_to_num(moved)) > SMALL):
+        return given
+    chosen = _with_process(given, varies, first, (last - first) / (COUNT - 1))
+    text = f"the density over the measurements is estimated at {COUNT} times, as drag moves the orbit"
+    return replace(renewed(given, given.measured, chosen), assumed=(*given.assumed, text))
+
+
+def _span(given: Setup) -> tuple[float, float]:
+    """The first node and the last: an orbit of before goes on from where it ended."""
+    times = given.tracking.times
+    begun = float(times[0])
+    if given.earlier is not None and given.problem.prior_time is not None:
+        begun = min(begun, float(given.problem.prior_time))
+    return begun, float(times[-1])
+
+
+def _with_process(given: Setup, varies: AirVaries, first: float, step: float) -> Chosen:
+    """The forces with it: all is text, and times and sigmas are parameters, so that others compile nothing."""
+    chosen = given.chosen
+    left = exp(-step / varies.time)
+    numbers = {
+        "first": first, "step": step, "rate": step / varies.time, "sigma": varies.sigma, "left": left,
+        "new": varies.sigma * sqrt(1.0 - left**2),
+    }  # fmt: skip
+    nodes = {f"{AIR}at_1": f"{AIR}sigma*{AIR}1"}
+    nodes |= {f"{AIR}at_{k}": f"{AIR}left*{AIR}at_{k - 1} + {AIR}new*{AIR}{k}" for k in range(2, COUNT + 1)}
+    hats = [f"max(1 - abs({AIR}within - {k - 1}), 0)*{AIR}at_{k}" for k in range(1, COUNT + 1)]
+    text = {
+        **nodes,
+        f"{AIR}place": f"(t - {AIR}first)/{AIR}step",
+        f"{AIR}within": f"max(min({AIR}place, {COUNT - 1}), 0)",
+        f"{AIR}change": f"exp(-{AIR}rate*abs({AIR}place - {AIR}within))*({' + '.join(hats)})",
+    }
+    every = {**chosen.forces.definitions, **chosen.extra.definitions}
+    zero = given.measured.epoch
+    labels = {}
+    for k in range(1, COUNT + 1):
+        when = (zero + (first + step * (k - 1))).to("UTC")[:16].replace("T", " ")
+        labels[f"{AIR}{k}"] = Label(f"{DENSITY}{k}", f"logarithm by which the density of the air departs at {when}")
+    extra = Extra({**text, **instead(every, COEFFICIENT, f"({COEFFICIENT} + {AIR}change)")}, labels=labels)
+    own = {f"{AIR}{k}": "estimated" for k in range(1, COUNT + 1)} | {f"{AIR}{name}": "fixed" for name in numbers}
+    values = {f"{AIR}{k}": Gaussian(0.0, 1.0) for k in range(1, COUNT + 1)} | {f"{AIR}{n}": v for n, v in numbers.items()}
+    return replace(chosen, roles={**chosen.roles, **own}, values={**chosen.values, **values}, extra=chosen.extra.and_(extra))
 
 
 def departure(given: Setup, estimate: Estimate, t: Array) -> Array:
     """Covariance (K, 6, 6) that the departure adds at times, zero up to the last measurement."""
     out = np.zeros((len(t), 6, 6))
-    air, column = given.chosen.air_varies, _column(given, estimate)
+    air, place = given.chosen.air_varies, _place(given)
     measured = np.isfinite(given.tracking.values).any(axis=1)
     last = float(given.tracking.row_times[measured][-1]) if measured.any() else np.inf
     late = np.flatnonzero(t > last)
-    if air is None or column is None or not len(late) or not given.problem.is_noise_free:
+    if air is None or place is None or not len(late) or not given.problem.is_noise_free:
         return out
     start = float(estimate.times[-1])
-    nodes = np.unique(np.concatenate([[start], np.arange(start, t.max(), air.time / NODES), t[t > start]]))
+    nodes = np.unique(np.concatenate([[start], np.arange(start, t.max(), air.time / PARTS), t[t > start]]))
     _, Phi = follow(given.problem, nodes, estimate.mean[-1], given.chosen.max_step)
     S = np.zeros((7, 7))
-    S[6, 6] = air.sigma**2
+    S[6, 6] = 0.0 if f"{AIR}1" in given.problem.model.names else air.sigma**2  # where it is estimated it is known so far
     found = {start: S[:6, :6].copy()}
     A = np.zeros((7, 7))
     for when, dt, one in zip(nodes[1:].tolist(), np.diff(nodes).tolist(), Phi, strict=True):
         left = exp(-dt / air.time)
-        A[:6, :6], A[:6, 6], A[6, 6] = one[:6, :6], one[:6, column.place] * column.value, left
+        A[:6, :6], A[:6, 6], A[6, 6] = one[:6, :6], one[:6, place], left
         S = A @ S @ A.T
         S[6, 6] += air.sigma**2 * (1.0 - left**2)
         found[when] = S[:6, :6].copy()
@@ -53,10 +113,8 @@ def departure(given: Setup, estimate: Estimate, t: Array) -> Array:
     return out
 
 
-def _column(given: Setup, estimate: Estimate) -> Column | None:
-    """The coefficient of drag, or its value for the last part of the time; None where it is not estimated."""
-    names = [n for n in given.problem.model.constants if n == "cd_a_m" or n.startswith("cd_a_m_")]
-    if not names:
-        return None
-    place = given.problem.model.names.index(names[-1])
-    return Column(place, float(estimate.mean[-1, place]))
+def _place(given: Setup) -> int | None:
+    """Where the coefficient of drag stands, or that of the last part of the time; None where it is not estimated."""
+    names = given.problem.model.names
+    own = [n for n in names if n.startswith("cd_a_m") and n.endswith("_log")]
+    return names.index(own[-1]) if own else None

@@ -13,11 +13,12 @@ import numpy as np
 
 from piazzi.determination.additions import with_unknowns
 from piazzi.determination.analysis import Analysis, analysed
-from piazzi.determination.approach import approached
+from piazzi.determination.approach import approached, refined
 from piazzi.determination.burns import burns_of
 from piazzi.determination.case import Case
 from piazzi.determination.case_file import split
 from piazzi.determination.common import with_common_errors
+from piazzi.determination.density import with_density
 from piazzi.determination.earlier import Earlier, earlier_of, fresh
 from piazzi.determination.editing import edited
 from piazzi.determination.faults import Faults, named
@@ -133,9 +134,7 @@ def determined(
     axes = answer_axes(given, case.frame)
     say("approaching")
     centre = given.measured.centre
-    return solved(
-        with_common_errors(approached(given)), chosen, axes or centre.frame, scale or centre.scale, say, notes or {}, case
-    )
+    return solved(ready(given), chosen, axes or centre.frame, scale or centre.scale, say, notes or {}, case)
 
 
 def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
@@ -146,6 +145,13 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
     seen, chosen, begin, earlier = read(files, case)
     begin = begin or unguided(seen, lambda first: posed(seen, chosen(first), first))
     return setup(seen, chosen(begin), begin, at=at, earlier=earlier)
+
+
+def ready(given: Setup) -> Setup:
+    """The set-up near its answer, with the noise that it shows: of the air where drag matters, of passes that have some."""
+    near = approached(given)
+    found = with_density(near)
+    return with_common_errors(near if found is near else refined(found))
 
 
 def fitting_orbits(*tracking: Any, case: Case | None = None, **words: Any) -> InitialOrbits:

@@ -10,6 +10,7 @@ from piazzi.determination import holding
 from piazzi.determination.guesses import CARTESIAN, SCHEMA
 from piazzi.determination.initial_result import UndeterminedError
 from piazzi.determination.orbit import definite_root, jacobian
+from piazzi.determination.physical import believed, nodes_of, said, said_name
 from piazzi.determination.published import beside
 from piazzi.determination.residuals import groups, rejected
 from piazzi.determination.verdict import KEYS
@@ -31,8 +32,8 @@ def document(found: Any) -> dict[str, Any]:
         "object": found.object,
         "epoch": found.epoch.to(found.scale),
         "frame": found.frame,
-        "names": list(model.names),
-        "units": [model.unit(name) for name in model.names],
+        "names": [said_name(name) for name in model.names],
+        "units": [model.unit(said_name(name)) for name in model.names],
         "mean": _listed(mean),
         "sigma": _listed(sigma),
         "covariance": [_listed(row) for row in covariance],
@@ -56,6 +57,7 @@ def document(found: Any) -> dict[str, Any]:
         "data": data(found),
         # beside the schema
         "about": found.setup.measured.about,
+        "density": [when.to(found.scale) for when in nodes_of(found.setup.problem)],
         "held": None if found.held is None else holding.to_dict(found.setup, found.held, found.scale),
         "published": [beside(found.orbit, one) for one in found.case.published] if known else [],
         **({} if found.setup.earlier is None else {"prior": prior(found)}),
@@ -91,23 +93,24 @@ def solution(found: Any) -> tuple[Array, Array]:
     mean, P = estimate.mean[k], estimate.covariance[k]
     if not (np.isfinite(mean).all() and np.isfinite(P).all()):
         return np.full(len(mean), np.nan), np.full(P.shape, np.nan)
-    J = np.eye(len(mean))
+    values, J = said(found.problem, mean)
     J[:6, :6] = jacobian(found.frame, found.epoch)
-    return J @ mean, transform_root(definite_root(P), J)
+    values[:6] = J[:6, :6] @ mean[:6]
+    return values, transform_root(definite_root(P), J)
 
 
 def estimated(found: Any) -> list[dict[str, Any]]:
-    """Constants that were estimated, with what was known of them before."""
+    """What was estimated beside position and velocity, with what was known of it before."""
     problem, k, labels = found.problem, found.setup.solution, found.setup.labels
-    mean, covariance = found.estimate.mean[k], found.estimate.covariance[k]
+    mean, J = said(problem, found.estimate.mean[k])
+    variance = np.diag(J @ found.estimate.covariance[k] @ J.T)
     out = []
-    for i, name in enumerate(problem.model.constants, start=len(problem.model.moving)):
-        given = problem.parameters[name]
+    for i, name in enumerate(problem.model.names[6:], start=6):
+        before, spread = believed(problem, name)
         out.append({
-            "name": labels[name].name if name in labels else name, "unit": problem.model.unit(name),
-            "prior": float(given.mean[0]), "prior_sigma": float(np.sqrt(given.covariance[0, 0])),
-            "value": finite(float(mean[i])),
-            "sigma": finite(float(np.sqrt(covariance[i, i]))) if covariance[i, i] >= 0 else None,
+            "name": labels[name].name if name in labels else name, "unit": problem.model.unit(said_name(name)),
+            "prior": before, "prior_sigma": spread, "value": finite(float(mean[i])),
+            "sigma": finite(float(np.sqrt(variance[i]))) if variance[i] >= 0 else None,
         })  # fmt: skip
     return out
 
@@ -115,15 +118,10 @@ def estimated(found: Any) -> list[dict[str, Any]]:
 def considered(found: Any) -> list[dict[str, Any]]:
     """Constants whose uncertainty counts and that were not estimated."""
     units, labels = {p.name: p.unit for p in found.problem.model.parameters}, found.setup.labels
-    given: dict[str, Gaussian] = {name: found.problem.parameters[name] for name in found.problem.considered}
+    given = {name: believed(found.problem, name) for name in found.problem.considered}
     return [
-        {
-            "name": labels[name].name if name in labels else name,
-            "unit": units[name],
-            "value": float(g.mean[0]),
-            "sigma": float(np.sqrt(g.covariance[0, 0])),
-        }
-        for name, g in given.items()
+        {"name": labels[name].name if name in labels else name, "unit": units[said_name(name)], "value": value, "sigma": sigma}
+        for name, (value, sigma) in given.items()
     ]
 
 

@@ -6,13 +6,14 @@ import json
 import os
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from piazzi.determination.guesses import SCHEMA, Guess
 from piazzi.determination.orbit import definite_root
+from piazzi.determination.physical import DENSITY
 from piazzi.determination.words import date
 from piazzi.earth import Epoch
 from piazzi.earth.rotation import frame_named
@@ -22,6 +23,8 @@ from piazzi.opening import opened
 from piazzi.orbit.starting import in_axes, start_of
 from piazzi.problem.checks import Array
 
+AIR_THEN = "density"  # the name of the air's density at the epoch
+SAME_TIME = 1.0  # s
 STATES = ("x", "y", "z", "vx", "vy", "vz")
 LARGEST = 2**26  # bytes of a determination
 
@@ -33,8 +36,9 @@ class Earlier:
     Attributes
     ----------
     epoch : of the state
-    state, covariance : (6,) and (6, 6), of the GCRF
-    constants : values and variances by name
+    names : of the values, position and velocity first; what stays is told by names of results, as is `density`, that of the
+        air at the epoch
+    mean, covariance : (n,) and (n, n), position and velocity in the GCRF
     used : first and last measurement that it was made of, None where nobody says it
     source : its file
     assumed : what was assumed of it
@@ -42,10 +46,10 @@ class Earlier:
     """
 
     epoch: Epoch
-    state: Array
+    mean: Array
     covariance: Array
     source: str
-    constants: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    names: tuple[str, ...] = STATES
     used: tuple[Epoch, Epoch] | None = None
     assumed: tuple[str, ...] = ()
     about: str = "earth"
@@ -53,7 +57,16 @@ class Earlier:
     @property
     def guess(self) -> Guess:
         """Where to begin."""
-        return Guess(self.epoch, self.state[:3], self.state[3:], self.source, about=self.about)
+        return Guess(self.epoch, self.mean[:3], self.mean[3:6], self.source, about=self.about)
+
+    def place(self, name: str, t: float, first: float) -> int | None:
+        """Index of a value by its name in results, None where it is not known; `t` is its epoch, `first` the first row (s).
+
+        Of the air the first node has what was known of it, where it stands at the epoch.
+        """
+        if name.startswith(DENSITY):
+            name = AIR_THEN if name == f"{DENSITY}1" and t <= first else ""
+        return self.names.index(name) if name in self.names else None
 
 
 def earlier_of(given: Any, near: Epoch, chosen: str | None = None) -> Earlier:
@@ -126,10 +139,23 @@ def _of_determination(facts: Mapping[str, Any], name: str) -> Earlier:
         raise ValueError(f"--prior {name}: the determination has no state with a covariance: {error}") from None
     factor, assumed = _inflated(facts, name)
     P = P * factor**2
-    J = in_axes(frame, "GCRF", [epoch])[0]
-    constants = {n: (float(mean[i]), float(P[i, i])) for i, n in enumerate(names) if n not in STATES and P[i, i] > 0}
-    about, state = str(facts.get("about", "earth")), J @ mean[order]
-    return Earlier(epoch, state, J @ P[np.ix_(order, order)] @ J.T, name, constants, _used(facts), assumed, about)
+    now = density_now(facts, epoch)
+    stays = [n for i, n in enumerate(names) if n not in STATES and P[i, i] > 0 and (n == now or not n.startswith(DENSITY))]
+    order += [names.index(n) for n in stays]
+    J = np.eye(len(order))
+    J[:6, :6] = in_axes(frame, "GCRF", [epoch])[0]
+    told = (*STATES, *(AIR_THEN if n == now else n for n in stays))
+    about = str(facts.get("about", "earth"))
+    return Earlier(epoch, J @ mean[order], J @ P[np.ix_(order, order)] @ J.T, name, told, _used(facts), assumed, about)
+
+
+def density_now(facts: Mapping[str, Any], epoch: Epoch) -> str:
+    """Name of the air's density at the epoch, "" where none of its nodes stands there."""
+    with suppress(KeyError, TypeError, ValueError):
+        for k, when in enumerate(facts["density"], start=1):
+            if abs(Epoch(str(when)) - epoch) < SAME_TIME:
+                return f"{DENSITY}{k}"
+    return ""
 
 
 def _inflated(facts: Mapping[str, Any], name: str) -> tuple[float, tuple[str, ...]]:

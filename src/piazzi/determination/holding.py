@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.analysis import Analysis, analysed
+from piazzi.determination.analysis import Analysis, analysed, of_orbit
 from piazzi.determination.fit import estimate
 from piazzi.determination.ranging import GAP
 from piazzi.determination.setup import Setup, follow, scale_of
@@ -170,7 +170,7 @@ def _by_steps(given: Setup, answer: Estimate, analysis: Analysis, rest: Array, r
     unit = scale_of(given, first)
     for left in reversed(range(ROUNDS)):
         root = here.information(rest, unit)
-        if not singular(root)[0][-1] > 1.0:
+        if not singular(of_orbit(root))[0][-1] > 1.0:
             return None
         step, length = here.toward(rest, root, unit)
         if length <= NEAR or not left:

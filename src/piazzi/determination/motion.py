@@ -108,26 +108,26 @@ def by_parts(name: str, one: Asked, before: Gaussian, first: float, last: float,
     for k, each in enumerate(names):
         start, end = (epoch + t for t in (first + one.what.period * k, first + one.what.period * (k + 1)))
         span = f"from {_minute(start)} to {_minute(end)}" if k < count - 1 else f"from {_minute(start)} on"
-        labels[each] = Label(f"{one.what.label}/{k + 1}", f"{_words(name)} {span}")
+        labels[each] = Label(f"{one.what.label}/{k + 1}", f"{words_of(name)} {span}")
     if count == 1:
-        return Extra(_instead(definitions, name, names[0]), labels=labels)
+        return Extra(instead(definitions, name, names[0]), labels=labels)
     now = {f"{name}_now": f"{name}_of(t, {', '.join(names)})"}
     edges = tuple(t + side for t in inner for side in (-RAMP / 2, RAMP / 2))
     function = Function(pieces(count), count + 1, 1, [(0, k) for k in range(1, count + 1)], inner)
-    return Extra({**_instead(definitions, name, f"{name}_now"), **now}, {f"{name}_of": function}, edges=edges, labels=labels)
+    return Extra({**instead(definitions, name, f"{name}_now"), **now}, {f"{name}_of": function}, edges=edges, labels=labels)
 
 
 def process(
     name: str, one: Asked, sigma: float, relative: bool, unit: str, definitions: Definitions, numbers: Numbers
 ) -> Extra:
-    """A parameter with a Gauss-Markov process beside it, which is a share of it where it is `relative`."""
+    """A parameter with a Gauss-Markov process beside it, which is that of its logarithm where it is `relative`."""
     state, tau = f"{name}_change", f"{name}_tau"
     numbers.roles[tau], numbers.values[tau] = "fixed", one.what.period
-    text = f"({name}*(1 + {state}))" if relative else f"({name} + {state})"
-    share = "share by which {} differs" if relative else "{} beside its constant"
-    label = Label(one.what.label, f"{share.format(_words(name))}, correlated over {one.what.per[1:] if one.what.per else ''}")
+    text = f"({name}*exp({state}))" if relative else f"({name} + {state})"
+    share = "logarithm by which {} differs" if relative else "{} beside its constant"
+    label = Label(one.what.label, f"{share.format(words_of(name))}, correlated over {one.what.per[1:] if one.what.per else ''}")
     own = Process(state, tau, one.what.period, sigma, "" if relative else unit, label)
-    return Extra(_instead(definitions, name, text), processes=(own,), labels={state: label})
+    return Extra(instead(definitions, name, text), processes=(own,), labels={state: label})
 
 
 def manoeuvres(burns: Sequence[Burn], epoch: Epoch, numbers: Numbers) -> Extra:
@@ -198,7 +198,7 @@ def _window(burn: Burn, epoch: Epoch) -> tuple[float, float]:
     return (start, start + burn.duration) if burn.duration else (start - IMPULSE / 2, start + IMPULSE / 2)
 
 
-def _instead(definitions: Definitions, name: str, text: str) -> dict[str, str]:
+def instead(definitions: Definitions, name: str, text: str) -> dict[str, str]:
     """Those definitions that use a name, with text in its place."""
     changed = {left: renamed(right, {name: text}) for left, right in definitions.items()}
     return {left: right for left, right in changed.items() if right != definitions[left]}
@@ -230,7 +230,8 @@ def process_noise(processes: Sequence[Process], states: int) -> Array | None:
     return np.diag(density)
 
 
-def _words(name: str) -> str:
+def words_of(name: str) -> str:
+    """What a parameter is, in words."""
     known = {"cd_a_m": "drag coefficient times area over mass", "cr_a_m": "coefficient of sunlight times area over mass"}
     return known.get(name, name.replace("_", " "))
 

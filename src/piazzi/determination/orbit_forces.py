@@ -92,7 +92,7 @@ def chosen_forces(
         share, hours = f"{varies.sigma:.0%}", f"{varies.time / 3600:g} h"
         assumed = (
             *assumed,
-            f"behind the last measurement the air departs from the fit by {share}, correlated over {hours} {AIR}",
+            f"the density departs from its model by {share}, correlated over {hours} {AIR}",
         )
     if varies is not None and forces.drag != "msis":
         told = "as if F10.7 were 150" if forces.drag == "harris-priester" else "the same always"

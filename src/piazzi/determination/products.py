@@ -98,7 +98,7 @@ def block(found: Any) -> dict[str, object]:
     model = found.problem.model
     out: dict[str, object] = {
         "OD_ID": "1", "OD_METHOD": f"{found.name} (Piazzi)", "OD_EPOCH": found.epoch.to(scale_of(found)).split()[0],
-        "OBS_AVAILABLE": count, "OBS_USED": used, "SOLVE_N": len(model.names), "SOLVE_STATES": ",".join(model.names),
+        "OBS_AVAILABLE": count, "OBS_USED": used, "SOLVE_N": len(model.names), "SOLVE_STATES": ",".join(facts["names"]),
         "SENSORS_N": len({one["station"] for one in facts["residuals"]}),
         "SENSORS": ",".join(dict.fromkeys(printable(one["station"]) for one in facts["residuals"])),
     }  # fmt: skip

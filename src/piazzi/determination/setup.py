@@ -14,6 +14,7 @@ from piazzi.determination.earlier import Earlier, root_of
 from piazzi.determination.guesses import Guess
 from piazzi.determination.motion import Extra, process_noise, with_processes
 from piazzi.determination.orbit_forces import Chosen
+from piazzi.determination.physical import AIR, LOG, POSITIVE, at_rest, said_name
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import Label
 from piazzi.earth import EphemerisWarning, Epoch
@@ -89,20 +90,18 @@ def setup(
     problem = posed(measured, chosen, guess, roles, values)
     tracking, rows, solution = _with_epoch(measured, at)
     times = tracking.times
-    begun = guess.epoch - measured.epoch
-    states = _followed(problem, begun, times, chosen.max_step)
     begin = float(times[0]) if earlier is None else earlier.epoch - measured.epoch
-    later = [m for m in problem.manoeuvres if m.time > begin + SAME * max(abs(begin), 1.0)]
-    problem = replace(problem, manoeuvres=later)
-    assumed, before = [*guess.assumed, *measured.assumed, *chosen.assumed], None
+    problem = _begun(problem, begin)
+    assumed = [*guess.assumed, *measured.assumed, *chosen.assumed]
+    before = None
+    if earlier is not None:
+        assumed += earlier.assumed
+        problem, before = _known(problem, earlier, begin, float(times[0]))
+    start = np.concatenate([guess.state, problem.mean[6:]])
+    states = _followed(problem, start, guess.epoch - measured.epoch, times, chosen.max_step)
     if earlier is None:
         mean = states[0, : len(problem.model.states)]
         problem = replace(problem, prior=_prior(mean, chosen.extra), prior_time=begin)
-    else:
-        assumed += earlier.assumed
-        problem = _known(problem, earlier, begin)
-        found = propagate(problem, times[:1])
-        before = (found.mean[0], root_of(found.covariance[0]))
     said = tuple(dict.fromkeys(assumed))
     return Setup(measured, chosen, guess, problem, tracking, rows, states, solution, said, earlier, before)
 
@@ -117,15 +116,52 @@ def at_last_used(given: Setup, keep: Array) -> Setup:
     return replace(given, solution=int(np.searchsorted(tracking.times, used.max())))
 
 
-def _known(problem: Problem, earlier: Earlier, t: float) -> Problem:
-    """The problem with an earlier orbit for its prior, and what that knew of the same processes and constants."""
+def renewed(given: Setup, measured: Measured, chosen: Chosen) -> Setup:
+    """The same with other unknowns, its states and its prior of the orbit as they were."""
+    problem, before = posed(measured, chosen, given.guess), None
+    begin, old = float(given.problem.prior_time or 0.0), given.problem
+    problem = _begun(problem, begin)
+    if given.earlier is None:
+        problem = replace(problem, prior=old.prior, prior_time=begin)
+    else:
+        problem, before = _known(problem, given.earlier, begin, float(given.tracking.times[0]))
+    place = {name: i for i, name in enumerate(old.model.names)}
+    states = np.tile(problem.mean, (len(given.states), 1))
+    for i, name in enumerate(problem.model.names):
+        if name in place:
+            states[:, i] = given.states[:, place[name]]
+    return replace(given, measured=measured, chosen=chosen, problem=problem, states=states, before=before)
+
+
+def _begun(problem: Problem, t: float) -> Problem:
+    """The problem with those manoeuvres that are behind its prior."""
+    return replace(problem, manoeuvres=[m for m in problem.manoeuvres if m.time > t + SAME * max(abs(t), 1.0)])
+
+
+def _known(problem: Problem, earlier: Earlier, t: float, first: float) -> tuple[Problem, tuple[Array, Array]]:
+    """The problem with an earlier orbit for its prior, and the belief at the first row with a root of its covariance.
+
+    What that knew of the same processes and constants goes on with its correlations: constants are states then, at rest.
+    """
+    known = {name: place for name in problem.model.names if (place := earlier.place(said_name(name), t, first)) is not None}
+    problem = at_rest(problem, [name for name in problem.model.constants if name in known])
+    names, parameters = problem.model.states, dict(problem.parameters)
     mean, P = problem.prior.mean.copy(), problem.prior.covariance.copy()
-    mean[:6], P[:6, :6] = earlier.state, earlier.covariance
-    for i, name in enumerate(problem.model.states[6:], start=6):
-        if name in earlier.constants:
-            mean[i], P[i, i] = earlier.constants[name]
-    constants = {name: Gaussian(*earlier.constants[name]) for name in problem.model.constants if name in earlier.constants}
-    return replace(problem, prior=Gaussian(mean, P), prior_time=t, parameters={**problem.parameters, **constants})
+    own = [i for i, name in enumerate(names) if name in known]
+    where = [known[names[i]] for i in own]
+    scale, centre = np.ones(len(own)), np.zeros(len(own))
+    for k, i in enumerate(own):
+        size = earlier.mean[where[k]]
+        if names[i].startswith(POSITIVE) and names[i].endswith(LOG):
+            parameters[said_name(names[i])], scale[k], centre[k] = size, 1.0 / size, size
+        elif names[i].startswith(AIR):
+            scale[k] = 1.0 / parameters[f"{AIR}sigma"]
+    P[own, :] = P[:, own] = 0.0
+    mean[own] = (earlier.mean[where] - centre) * scale
+    P[np.ix_(own, own)] = earlier.covariance[np.ix_(where, where)] * np.outer(scale, scale)
+    problem = replace(problem, prior=Gaussian(mean, P), prior_time=t, parameters=parameters)
+    found = propagate(problem, np.array([first]))
+    return problem, (found.mean[0], root_of(found.covariance[0]))
 
 
 def with_prior(given: Setup, states: Array, covariance: Array) -> Setup:
@@ -205,9 +241,8 @@ def _with_epoch(measured: Measured, at: Epoch | None) -> tuple[Tracking, Array, 
     return new, np.insert(rows, place, -1, axis=0), int(np.searchsorted(new.times, t))
 
 
-def _followed(problem: Problem, begun: float, times: Array, step: float) -> Array:
-    """States (K, n) at the times of the orbit that is at the prior mean when `begun`."""
-    first = problem.mean
+def _followed(problem: Problem, first: Array, begun: float, times: Array, step: float) -> Array:
+    """States (K, n) at the times of the orbit that is at `first` when `begun`."""
     gap = float(times[0]) - begun
     if gap:
         nodes = np.linspace(begun, float(times[0]), max(ceil(abs(gap) / step), 1) + 1)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.determination.document import document
+from piazzi.determination.physical import believed, said_name
 from piazzi.determination.setup import Setup
 from piazzi.determination.verdict import apart_by
 from piazzi.evaluate.grids import Grid, as_html, as_rich
@@ -196,6 +197,6 @@ def shown(given: Setup) -> str:
 
 def _unknown(given: Setup, name: str) -> str:
     """A constant in words, with what is known of it before the measurements."""
-    prior, label = given.problem.parameters[name], given.labels.get(name)
+    (mean, spread), label = believed(given.problem, name), given.labels.get(name)
     words = name if label is None else f"{label.name}, {label.words}"
-    return f"{words}: {prior.mean[0]:.4g} +- {prior.covariance[0, 0] ** 0.5:.3g} {given.problem.model.unit(name)}".rstrip()
+    return f"{words}: {mean:.4g} +- {spread:.3g} {given.problem.model.unit(said_name(name))}".rstrip()

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.analysis import Analysis
+from piazzi.determination.analysis import Analysis, of_orbit
 from piazzi.determination.common import together
 from piazzi.determination.completeness import truncated
 from piazzi.determination.faults import STATION, Faults
 from piazzi.determination.holding import GOOD, Held, labels_of
-from piazzi.determination.physical import physical
 from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate
@@ -70,7 +69,7 @@ def verdict(
                 seen(given, analysis, keep),
                 alone(given),
                 converged(given, answer, analysis, keep),
-                physical(given, answer, unseen(honest(given, analysis, keep, faults), held)),
+                unseen(honest(given, analysis, keep, faults), held),
                 agreed(given, name, estimates),
                 complete(given, answer, analysis, keep),
             ),
@@ -88,8 +87,8 @@ def seen(given: Setup, analysis: Analysis | None, keep: Array) -> Sentence:
         return Sentence(None, None, test, "Seen: the fit gave no orbit to ask this of.")
     scale = scale_of(given, given.states[0])
     root = analysis.information(keep, scale)
-    values, directions = singular(root)
-    smallest, weakest = float(values[-1]), directions[-1] * scale
+    values, directions = singular(of_orbit(root))
+    smallest, weakest = float(values[-1]), directions[-1] * scale[:6]
     many = int(np.isfinite(analysis.whitened[keep]).sum())
     words = _direction(given.states[0], weakest)
     means = f"{many} measurements" + (f" and {given.earlier.source}" if given.earlier else " alone")
@@ -116,10 +115,10 @@ def _widest(state: Array, root: Array, scale: Array) -> tuple[str, float]:
 
 
 def _direction(state: Array, change: Array) -> str:
-    """The largest component of a change of state along the axes of the orbit, or of a constant."""
-    local = state_axes(state[:3], state[3:6]) @ change[:6]
+    """The largest component of a change of position and velocity along the axes of the orbit."""
+    local = state_axes(state[:3], state[3:6]) @ change
     share = np.abs(local) / np.repeat([np.linalg.norm(state[:3]), np.linalg.norm(state[3:6])], 3)
-    return AXES[int(np.argmax(share))] if np.isfinite(share).all() and share.any() else "a constant"
+    return AXES[int(np.argmax(share))] if np.isfinite(share).all() else "unknown"
 
 
 def alone(given: Setup) -> Sentence:
