@@ -10,7 +10,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis, of_orbit
 from piazzi.determination.common import together
-from piazzi.determination.completeness import truncated
+from piazzi.determination.completeness import left_out
 from piazzi.determination.faults import STATION, Faults
 from piazzi.determination.holding import GOOD, Held, labels_of
 from piazzi.determination.setup import WIDE, Setup, scale_of
@@ -25,6 +25,7 @@ KEYS = ("seen", "alone", "converged", "honest", "agreed", "complete")
 DECISIVE = KEYS[:3]
 SURE = 0.999  # of the two-sided test of residuals
 NEAR, APART = 1.0, 3.0  # sigma, by which estimators of all measurements, and those of real time, may differ
+TOLD = 3  # forces that are left out, the largest
 UNLIKELY = 0.01  # of another orbit that fits
 STILL = 1e-2  # sigma of a last step
 AXES = (
@@ -220,19 +221,20 @@ def unseen(fitted: Sentence, held: Held | None) -> Sentence:
 
 
 def complete(given: Setup, answer: Estimate, analysis: Analysis | None, keep: Array) -> Sentence:
-    """Whether a field of twice the degree would move the orbit."""
-    test = "largest change of a state of the solution in sigma, in a gravity field of twice the degree, up to 1"
+    """Whether what the forces leave out would move the orbit."""
+    test = "largest change of a state of the solution in sigma, with twice the degree of gravity or a force left out, up to 1"
     none = Sentence(None, None, test, "Complete: what the forces leave out is not weighed against sigma here.")
     if analysis is None or answer.view != "delayed" or not answer.success:
         return none
-    found = truncated(given, answer.mean, analysis, keep)
-    if found is None:
+    found = left_out(given, answer.mean, analysis, keep)
+    if not found:
         return none
-    degree, more, moved = found
-    had = f"degree {degree}" if degree > 1 else "the Earth as a point"
-    text = f"gravity to degree {more} instead of {had} moves the solution by {number(moved, 2)} sigma"
-    others = "; other forces that are left out are not weighed" if moved <= 1.0 else ""
-    return Sentence(moved <= 1.0, moved, test, f"{'Complete' if moved <= 1.0 else 'Not complete'}: {text}{others}.")
+    worst = max(found.values())
+    said = [f"{name} by {number(moved, 2)}" for name, moved in found.items()]
+    large = [text for text, moved in zip(said, found.values(), strict=True) if moved > 1.0]
+    if large:
+        return Sentence(False, worst, test, f"Not complete: the solution would move, in sigma, with {', '.join(large)}.")
+    return Sentence(True, worst, test, f"Complete: the solution would move, in sigma, with {', '.join(said[:TOLD])}.")
 
 
 def agreed(given: Setup, name: str, estimates: Mapping[str, Estimate]) -> Sentence:
