@@ -3,15 +3,17 @@
 Density varies with the Sun and the geomagnetic field in ways that no model follows.  The logarithm of what it departs by is a
 first-order Gauss-Markov process.  Where drag moves an orbit by more than a tenth of what its measurements leave open, the
 process is estimated: its values at nodes that are equally far apart, from the first measurement or the orbit of before to the
-last, are made of independent numbers of unit variance, and between them it is linear.  An orbit stays one arc so, which the
-first state and constants determine.  Behind the last node its mean goes back to zero, and what it may have become meanwhile is
-added to covariances by the derivatives of the state by the coefficient of drag.
+last, are made of independent numbers of unit variance, and between them it is linear.  Beside it stand sine and cosine of the
+argument of latitude, as models differ most in how much more air there is by day than by night.  So an orbit stays one arc,
+which the first state and constants determine.  Behind the last node its mean goes back to zero, and what it may have become
+meanwhile is added to covariances by the derivatives of the state by the coefficient of drag.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from math import exp, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from piazzi.determination.orbit_forces import AirVaries, Chosen
 from piazzi.determination.physical import AIR, DENSITY
 from piazzi.determination.setup import Setup, follow, renewed
 from piazzi.determination.unknowns import Label
+from piazzi.earth.force_text import LATITUDE
 from piazzi.estimate.estimator import Estimate
 from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
@@ -28,6 +31,8 @@ from piazzi.problem.checks import Array
 COUNT = 8  # nodes over the measurements, however long these are: another number would compile other kernels
 SMALL = 0.1  # of a sigma, by which drag may move the solution before the density counts
 PARTS = 20.0  # of the process's time behind the measurements, in each of which it is constant
+WAVES = ("cos", "sin")
+NAMES = {"cos": "cosine", "sin": "sine"}
 COEFFICIENT = "cd_a_m_log"
 
 
@@ -72,7 +77,9 @@ def _with_process(given: Setup, varies: AirVaries, first: float, step: float) ->
         **nodes,
         f"{AIR}place": f"(t - {AIR}first)/{AIR}step",
         f"{AIR}within": f"max(min({AIR}place, {COUNT - 1}), 0)",
-        f"{AIR}change": f"exp(-{AIR}rate*abs({AIR}place - {AIR}within))*({' + '.join(hats)})",
+        **LATITUDE,
+        f"{AIR}change": f"exp(-{AIR}rate*abs({AIR}place - {AIR}within))*({' + '.join(hats)})"
+        + f" + {' + '.join(f'{DENSITY}{wave}*latitude_{wave}' for wave in WAVES)}",
     }
     every = {**chosen.forces.definitions, **chosen.extra.definitions}
     zero = given.measured.epoch
@@ -80,9 +87,13 @@ def _with_process(given: Setup, varies: AirVaries, first: float, step: float) ->
     for k in range(1, COUNT + 1):
         when = (zero + (first + step * (k - 1))).to("UTC")[:16].replace("T", " ")
         labels[f"{AIR}{k}"] = Label(f"{DENSITY}{k}", f"logarithm by which the density of the air departs at {when}")
+    for wave in WAVES:
+        labels[f"{DENSITY}{wave}"] = Label(f"{DENSITY}{wave}", f"logarithm of the density: its {NAMES[wave]} over a turn")
     extra = Extra({**text, **instead(every, COEFFICIENT, f"({COEFFICIENT} + {AIR}change)")}, labels=labels)
     own = {f"{AIR}{k}": "estimated" for k in range(1, COUNT + 1)} | {f"{AIR}{name}": "fixed" for name in numbers}
-    values = {f"{AIR}{k}": Gaussian(0.0, 1.0) for k in range(1, COUNT + 1)} | {f"{AIR}{n}": v for n, v in numbers.items()}
+    own |= {f"{DENSITY}{wave}": "estimated" for wave in WAVES}
+    values: dict[str, Any] = {f"{DENSITY}{wave}": Gaussian(0.0, varies.sigma**2) for wave in WAVES}
+    values |= {f"{AIR}{k}": Gaussian(0.0, 1.0) for k in range(1, COUNT + 1)} | {f"{AIR}{n}": v for n, v in numbers.items()}
     return replace(chosen, roles={**chosen.roles, **own}, values={**chosen.values, **values}, extra=chosen.extra.and_(extra))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from piazzi.determination.guesses import SCHEMA, Guess
 from piazzi.determination.orbit import definite_root
-from piazzi.determination.physical import DENSITY
+from piazzi.determination.physical import DENSITY, is_node
 from piazzi.determination.words import date
 from piazzi.earth import Epoch
 from piazzi.earth.rotation import frame_named
@@ -64,7 +64,7 @@ class Earlier:
 
         Of the air the first node has what was known of it, where it stands at the epoch.
         """
-        if name.startswith(DENSITY):
+        if is_node(name, DENSITY):
             name = AIR_THEN if name == f"{DENSITY}1" and t <= first else ""
         return self.names.index(name) if name in self.names else None
 
@@ -140,7 +140,7 @@ def _of_determination(facts: Mapping[str, Any], name: str) -> Earlier:
     factor, assumed = _inflated(facts, name)
     P = P * factor**2
     now = density_now(facts, epoch)
-    stays = [n for i, n in enumerate(names) if n not in STATES and P[i, i] > 0 and (n == now or not n.startswith(DENSITY))]
+    stays = [n for i, n in enumerate(names) if n not in STATES and P[i, i] > 0 and (n == now or not is_node(n, DENSITY))]
     order += [names.index(n) for n in stays]
     J = np.eye(len(order))
     J[:6, :6] = in_axes(frame, "GCRF", [epoch])[0]

@@ -43,7 +43,7 @@ def by_logarithms(numbers: Numbers, extra: Extra, definitions: Mapping[str, str]
 def air_of(problem: Problem) -> tuple[list[int], Array]:
     """Where what drives the density stands, and the matrix (k, k) that makes its logarithm at the nodes of it."""
     names = problem.model.names
-    count = sum(name.startswith(AIR) for name in names)
+    count = sum(is_node(name) for name in names)
     where = [names.index(f"{AIR}{k}") for k in range(1, count + 1)]
     if not count:
         return where, np.empty((0, 0))
@@ -54,6 +54,11 @@ def air_of(problem: Problem) -> tuple[list[int], Array]:
     return where, root
 
 
+def is_node(name: str, of: str = AIR) -> bool:
+    """Whether a name is that of the density at a node."""
+    return name.startswith(of) and name.removeprefix(of).isdigit()
+
+
 def nodes_of(problem: Problem) -> list[Any]:
     """Dates at which the density is estimated."""
     first, step = (problem.parameters.get(f"{AIR}{what}", 0.0) for what in ("first", "step"))
@@ -62,7 +67,7 @@ def nodes_of(problem: Problem) -> list[Any]:
 
 def said_name(name: str) -> str:
     """The name by which results have a value that is estimated."""
-    if name.startswith(AIR):
+    if is_node(name):
         return DENSITY + name.removeprefix(AIR)
     return name.removesuffix(LOG) if name.startswith(POSITIVE) else name
 

@@ -190,13 +190,7 @@ def empirical(names: Sequence[str]) -> Force:
 
     Those named `radial`, `along`, `cross` are constant; with `_sin` or `_cos` they go with that of the argument of latitude.
     """
-    text = dict(ORBIT_AXES)
-    if any("_" in name for name in names):
-        text |= {  # of the ascending node; without an inclination there is none, and no wave
-            "node": "r*sqrt(hx**2 + hy**2 + 1e-24*h**2)",
-            "latitude_sin": "z*h/node",
-            "latitude_cos": "(y*hx - x*hy)/node",
-        }
+    text = dict(LATITUDE if any("_" in name for name in names) else ORBIT_AXES)
     sizes: dict[str, list[str]] = {}
     for name in names:
         direction, _, wave = name.partition("_")
@@ -207,6 +201,11 @@ def empirical(names: Sequence[str]) -> Force:
 
 
 ORBIT_AXES = {f"h{a}": f"{b}*v{c} - {c}*v{b}" for a, b, c in ("xyz", "yzx", "zxy")} | {"h": "sqrt(hx**2 + hy**2 + hz**2)"}
+LATITUDE = ORBIT_AXES | {  # its argument, from the ascending node; without an inclination there is none, and no wave
+    "node": "r*sqrt(hx**2 + hy**2 + 1e-24*h**2)",
+    "latitude_sin": "z*h/node",
+    "latitude_cos": "(y*hx - x*hy)/node",
+}
 _UNIT = {
     "radial": {a: f"{a}/r" for a in "xyz"},
     "along": {a: f"(h{b}*{c} - h{c}*{b})/(h*r)" for a, b, c in ("xyz", "yzx", "zxy")},
