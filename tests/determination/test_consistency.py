@@ -9,7 +9,7 @@ from piazzi.determination import density
 from piazzi.determination.approach import approached
 from piazzi.determination.density import with_density
 from piazzi.determination.orbit_forces import AirVaries, air_varies
-from piazzi.determination.physical import nodes_of, said
+from piazzi.determination.physical import air_of, is_node, nodes_of
 from piazzi.determination.setup import follow
 from piazzi.estimate.chi_square import quantile
 from tests.references.determinations import AIR, KINDS, begun, consistency, drawn, predictions, within
@@ -38,12 +38,12 @@ def low():
 
 @pytest.mark.slow
 def test_density_is_a_gauss_markov_process_at_its_nodes(low):
-    """Covariances of what results call density, from its law: sigma^2 exp(-|lag| / time)."""
+    """Covariances of the density at its nodes, from its law: sigma^2 exp(-|lag| / time)."""
     given = with_density(approached(low))
     varies, names = given.chosen.air_varies, given.problem.model.names
-    where = [i for i, name in enumerate(names) if name.startswith("air_")]
-    J = said(given.problem, given.problem.mean)[1]
-    P = (J @ given.problem.covariance @ J.T)[np.ix_(where, where)]
+    where = [i for i, name in enumerate(names) if is_node(name)]
+    root = air_of(given.problem)[1]
+    P = root @ given.problem.covariance[np.ix_(where, where)] @ root.T
     t = np.array([when - given.measured.epoch for when in nodes_of(given.problem)])
     law = varies.sigma**2 * np.exp(-np.abs(np.subtract.outer(t, t)) / varies.time)
     np.testing.assert_allclose(P, law, rtol=1e-12)
@@ -52,11 +52,12 @@ def test_density_is_a_gauss_markov_process_at_its_nodes(low):
     # between nodes it is linear, and it goes back to the model's outside: by the rate of a coefficient that is as much larger
     mean = given.problem.mean.copy()
     mean[:6], mean[where] = low.states[0][:6], np.random.default_rng(0).standard_normal(len(where))
-    nodes = said(given.problem, mean)[0][where]
+    nodes = root @ mean[where]
     for when in (t[2] + 0.25 * (t[3] - t[2]), t[0] - 7200.0, t[-1] + 7200.0):
         inside = np.interp(when, t, nodes) * np.exp(-max(t[0] - when, when - t[-1], 0.0) / varies.time)
         other = given.problem.mean.copy()
-        other[:6], other[names.index("cd_a_m_log")] = mean[:6], inside
+        other[:6] = mean[:6]
+        other[names.index("cd_a_m_share")] += inside
         np.testing.assert_allclose(given.problem.dynamics(mean, when), given.problem.dynamics(other, when), rtol=1e-13)
 
 
@@ -87,7 +88,7 @@ def test_a_departure_that_never_ends_is_a_wrong_coefficient():
 
     given = replace(given, chosen=replace(given.chosen, air_varies=AirVaries(0.1, 1e15)))
     found = density.departure(given, Estimate, t)
-    place = given.problem.model.names.index("cd_a_m_log")
+    place = given.problem.model.names.index("cd_a_m_share")
     Phi = follow(given.problem, np.array([last, *t[1:]]), first, given.chosen.max_step)[1]
     by = (Phi[1] @ Phi[0])[:6, place] * 0.1
     assert not found[0].any()

@@ -6,7 +6,7 @@ import pytest
 import piazzi as pz
 from piazzi.determination.burns import Burn, burns_of
 from piazzi.determination.motion import Extra, Numbers
-from piazzi.determination.physical import at_rest, believed, by_logarithms, said, said_name
+from piazzi.determination.physical import USUAL, at_rest, believed, by_shares, said, said_name, share_of, value_of
 from piazzi.determination.ramps import RAMP, pieces, profiles
 from piazzi.determination.unknowns import asked, considered, listed
 from piazzi.outside.function import Function
@@ -175,7 +175,7 @@ def uncertain():
         {"cd_a_m": pz.Gaussian(0.02, 0.01**2), "cr_a_m": pz.Gaussian(0.013, 0.0013**2)},
     )
     definitions = {"pull": "cd_a_m*x + cr_a_m"}
-    extra = by_logarithms(numbers, Extra(), definitions)
+    extra = by_shares(numbers, Extra(), definitions)
     model = pz.Model(
         ("x",), {"x": "pull"}, pz.Sensor("s", {"z": "x"}), [pz.Parameter(n, r) for n, r in numbers.roles.items()],
         definitions=definitions | dict(extra.definitions),
@@ -185,32 +185,35 @@ def uncertain():
 
 def test_coefficients_are_positive_whatever_is_estimated():
     problem = uncertain()
-    assert problem.model.names == ("x", "cd_a_m_log") and problem.considered == ("cr_a_m_log",)
-    for value in (-3.0, 0.0, 2.0):
-        mean = np.array([5.0, value])
-        said_mean, J = said(problem, mean)
-        assert said_mean[1] == pytest.approx(0.02 * np.exp(value)) and said_mean[1] > 0 and said_mean[0] == 5.0
-        near = said(problem, np.array([5.0, value + 1e-6]))[0] - said(problem, np.array([5.0, value - 1e-6]))[0]
+    assert problem.model.names == ("x", "cd_a_m_share") and problem.considered == ("cr_a_m_share",)
+    for share in (-3.0, 0.0, USUAL, 4.0):
+        mean = np.array([5.0, share])
+        values, J = said(problem, mean)
+        assert values[1] == pytest.approx(0.01 * (share + np.sqrt(share**2 + 0.04))) and values[1] > 0 and values[0] == 5.0
+        near = said(problem, np.array([5.0, share + 1e-6]))[0] - said(problem, np.array([5.0, share - 1e-6]))[0]
         np.testing.assert_allclose(J[:, 1], near / 2e-6, rtol=1e-6)
-        assert problem.dynamics(mean, 0.0)[0] == pytest.approx(5.0 * said_mean[1] + 0.013)
-    # one sigma is a factor of 1 + share either way
-    assert believed(problem, "cd_a_m_log") == pytest.approx((0.02, 0.02 * np.log(1.5)))
-    assert believed(problem, "cr_a_m_log") == pytest.approx((0.013, 0.013 * np.log(1.1)))
-    assert [said_name(n) for n in ("cd_a_m_2_log", "cd_a_m_change", "air_3", "range_log")] == [
-        "cd_a_m_2", "cd_a_m_change", "density_3", "range_log",
+        assert problem.dynamics(mean, 0.0)[0] == pytest.approx(5.0 * values[1] + 0.013)
+    # a straight line above a fifth of the usual, to some percent of that
+    share = np.linspace(0.2, 5.0, 50)
+    np.testing.assert_allclose(value_of(share), share, atol=0.05)
+    np.testing.assert_allclose(share_of(value_of(share)), share, rtol=1e-12)
+    assert believed(problem, "cd_a_m_share") == pytest.approx((0.02, 0.01), rel=0.01)
+    assert believed(problem, "cr_a_m_share") == pytest.approx((0.013, 0.0013), rel=0.01)
+    assert [said_name(n) for n in ("cd_a_m_2_share", "cd_a_m_change", "air_3", "range_share")] == [
+        "cd_a_m_2", "cd_a_m_change", "density_3", "range_share",
     ]  # fmt: skip
 
 
 def test_a_coefficient_of_nothing_cannot_be_estimated():
     numbers = Numbers({"cd_a_m": "estimated"}, {"cd_a_m": pz.Gaussian(0.0, 1.0)})
     with pytest.raises(ValueError, match="cd_a_m is 0 before the measurements"):
-        by_logarithms(numbers, Extra(), {"pull": "cd_a_m*x"})
+        by_shares(numbers, Extra(), {"pull": "cd_a_m*x"})
 
 
 def test_constants_at_rest_are_states_with_the_same_numbers():
     problem = uncertain()
-    moved = at_rest(problem, ["cd_a_m_log"])
-    assert moved.model.states == ("x", "cd_a_m_log") and moved.model.names == problem.model.names
+    moved = at_rest(problem, ["cd_a_m_share"])
+    assert moved.model.states == ("x", "cd_a_m_share") and moved.model.names == problem.model.names
     np.testing.assert_array_equal(moved.covariance, problem.covariance)
     np.testing.assert_array_equal(moved.mean, problem.mean)
     assert moved.dynamics(moved.mean, 0.0)[1] == 0.0 and moved.is_noise_free

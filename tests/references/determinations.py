@@ -160,8 +160,8 @@ PIECE = 3600.0  # s, in which the density of a truth keeps to its share
 
 
 def flown(given, first, times, share):
-    """States (K, n) of an orbit whose coefficient of drag is multiplied by exp(share), another in each hour."""
-    place = given.problem.model.names.index("cd_a_m_log")
+    """States (K, n) of an orbit to whose coefficient of drag a share of the usual one is added, another in each hour."""
+    place = given.problem.model.names.index("cd_a_m_share")
     out, x, t, mean = [], first.copy(), float(times[0]), first[place]
     for k, part in enumerate(share):
         end = min(PIECE * (k + 1), float(times[-1]))
@@ -194,7 +194,7 @@ def predictions(kind, count, other=None, days=(1, 2, 3), first=0):
             share[k] = left * share[k - 1] + 0.32 * np.sqrt(1 - left**2) * rng.standard_normal()
         start = truth.states[0].copy()
         start[:6] += np.repeat(kind.off, 3) * rng.standard_normal(6)
-        start[names.index("cd_a_m_log")] = 0.3 * rng.standard_normal()
+        start[names.index("cd_a_m_share")] = 1.0 + 0.3 * rng.standard_normal()
         states = flown(truth, start, times, share if other is None else 0.0 * share)
         z = predicted(truth.problem, prepare(truth.problem, truth.tracking), states[: len(rows)])
         z = z + kind.sigma * rng.standard_normal(z.shape)

@@ -12,7 +12,7 @@ from piazzi.determination import motion
 from piazzi.determination.burns import UNPLANNED, Burn
 from piazzi.determination.motion import Extra, Numbers
 from piazzi.determination.orbit_forces import ACCELERATION, COEFFICIENTS, Chosen
-from piazzi.determination.physical import by_logarithms
+from piazzi.determination.physical import by_shares
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import DV, Asked, of_parameters
 from piazzi.earth.force_options import CONSTANT, ONCE_PER_REV
@@ -38,7 +38,7 @@ def with_unknowns(chosen: Chosen, given: Sequence[Asked], burns: Sequence[Burn],
     sudden = [_sudden(one) for one in given if one.what.kind == DV]
     every = sorted((*burns, *sudden), key=lambda b: (b.epoch.whole, b.epoch.fraction))
     extra = extra.and_(motion.manoeuvres(every, seen.epoch, numbers))
-    extra = extra.and_(by_logarithms(numbers, extra, {**chosen.forces.definitions, **extra.definitions}))
+    extra = extra.and_(by_shares(numbers, extra, {**chosen.forces.definitions, **extra.definitions}))
     usual = [b for b in every if b.assumed]
     said = tuple(f"sigma of the manoeuvre at {b.epoch}: {_off(b)}" for b in usual)
     return replace(chosen, roles=numbers.roles, values=numbers.values, extra=extra, assumed=(*chosen.assumed, *said))

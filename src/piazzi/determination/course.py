@@ -187,8 +187,8 @@ def _with_density(facts: Mapping[str, Any], names: list[str], mean: Array, P: Ar
         return mean, P
     drag, air = names.index("cd_a_m"), names.index(now)
     J, mean = np.eye(len(names)), mean.copy()
-    mean[drag] *= np.exp(mean[air])
-    J[drag, drag], J[drag, air] = np.exp(mean[air]), mean[drag]
+    J[drag, drag], J[drag, air] = 1.0 + mean[air], mean[drag]
+    mean[drag] = max(mean[drag] * (1.0 + mean[air]), 0.0)
     return mean, J @ P @ J.T
 
 

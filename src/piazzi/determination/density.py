@@ -1,6 +1,6 @@
 """How far the density of the air departs from that of its model: over the measurements, and behind them.
 
-Density varies with the Sun and the geomagnetic field in ways that no model follows.  The logarithm of what it departs by is a
+Density varies with the Sun and the geomagnetic field in ways that no model follows.  The share by which it departs is a
 first-order Gauss-Markov process.  Where drag moves an orbit by more than a tenth of what its measurements leave open, the
 process is estimated: its values at nodes that are equally far apart, from the first measurement or the orbit of before to the
 last, are made of independent numbers of unit variance, and between them it is linear.  Beside it stand sine and cosine of the
@@ -20,9 +20,10 @@ import numpy as np
 from piazzi.determination.analysis import analysed
 from piazzi.determination.motion import Extra, instead
 from piazzi.determination.orbit_forces import AirVaries, Chosen
-from piazzi.determination.physical import AIR, DENSITY
+from piazzi.determination.physical import AIR, DENSITY, DRAG, SHARE, said_name, share_of, value_of
 from piazzi.determination.setup import Setup, follow, renewed
 from piazzi.determination.unknowns import Label
+from piazzi.earth import Epoch
 from piazzi.earth.force_text import LATITUDE
 from piazzi.estimate.estimator import Estimate
 from piazzi.problem import Gaussian
@@ -33,7 +34,7 @@ SMALL = 0.1  # of a sigma, by which drag may move the solution before the densit
 PARTS = 20.0  # of the process's time behind the measurements, in each of which it is constant
 WAVES = ("cos", "sin")
 NAMES = {"cos": "cosine", "sin": "sine"}
-COEFFICIENT = "cd_a_m_log"
+LEAST = 0.1  # of the usual coefficient, which shares are of at the least
 
 
 def with_density(given: Setup) -> Setup:
@@ -42,15 +43,33 @@ def with_density(given: Setup) -> Setup:
     Its states are those of the set-up, with the density as the model has it.
     """
     varies, names = given.chosen.air_varies, given.problem.model.names
-    if varies is None or COEFFICIENT not in names or not np.isfinite(given.states).all():
+    if varies is None or DRAG not in names or not np.isfinite(given.states).all():
         return given
     first, last = _span(given)
-    moved = analysed(given, given.states).rows[..., names.index(COEFFICIENT)]
+    moved = analysed(given, given.states).rows[..., names.index(DRAG)]
     if not (last > first and np.linalg.norm(np.nan_to_num(moved)) > SMALL):
         return given
-    chosen = _with_process(given, varies, first, (last - first) / (COUNT - 1))
+    chosen = _with_process(_about(given), given.measured.epoch, varies, first, (last - first) / (COUNT - 1))
     text = f"the density over the measurements is estimated at {COUNT} times, as drag moves the orbit"
-    return replace(renewed(given, given.measured, chosen), assumed=(*given.assumed, text))
+    found = renewed(given, given.measured, chosen)
+    place = found.problem.model.names.index(DRAG)
+    found.states[:, place] = share_of(_coefficient(given) / float(found.problem.parameters[said_name(DRAG)]))
+    return replace(found, assumed=(*given.assumed, text))
+
+
+def _coefficient(given: Setup) -> float:
+    """That of drag which the states have."""
+    share = float(given.states[0, given.problem.model.names.index(DRAG)])
+    return float(given.problem.parameters[said_name(DRAG)]) * float(value_of(share))
+
+
+def _about(given: Setup) -> Chosen:
+    """The forces with what was found for the usual coefficient, so that shares of the density are of that."""
+    chosen, name = given.chosen, said_name(DRAG)
+    old, before = float(chosen.values[name]), chosen.values[DRAG]
+    new = max(_coefficient(given), LEAST * old)
+    scaled = Gaussian(share_of(old / new), float(before.covariance[0, 0]) * (old / new) ** 2)
+    return replace(chosen, values={**chosen.values, name: new, DRAG: scaled})
 
 
 def _span(given: Setup) -> tuple[float, float]:
@@ -62,9 +81,8 @@ def _span(given: Setup) -> tuple[float, float]:
     return begun, float(times[-1])
 
 
-def _with_process(given: Setup, varies: AirVaries, first: float, step: float) -> Chosen:
+def _with_process(chosen: Chosen, epoch: Epoch, varies: AirVaries, first: float, step: float) -> Chosen:
     """The forces with it: all is text, and times and sigmas are parameters, so that others compile nothing."""
-    chosen = given.chosen
     left = exp(-step / varies.time)
     numbers = {
         "first": first, "step": step, "rate": step / varies.time, "sigma": varies.sigma, "left": left,
@@ -82,14 +100,14 @@ def _with_process(given: Setup, varies: AirVaries, first: float, step: float) ->
         + f" + {' + '.join(f'{DENSITY}{wave}*latitude_{wave}' for wave in WAVES)}",
     }
     every = {**chosen.forces.definitions, **chosen.extra.definitions}
-    zero = given.measured.epoch
     labels = {}
     for k in range(1, COUNT + 1):
-        when = (zero + (first + step * (k - 1))).to("UTC")[:16].replace("T", " ")
-        labels[f"{AIR}{k}"] = Label(f"{DENSITY}{k}", f"logarithm by which the density of the air departs at {when}")
+        when = (epoch + (first + step * (k - 1))).to("UTC")[:16].replace("T", " ")
+        labels[f"{AIR}{k}"] = Label(f"{DENSITY}{k}", f"share by which the density of the air departs at {when}")
     for wave in WAVES:
-        labels[f"{DENSITY}{wave}"] = Label(f"{DENSITY}{wave}", f"logarithm of the density: its {NAMES[wave]} over a turn")
-    extra = Extra({**text, **instead(every, COEFFICIENT, f"({COEFFICIENT} + {AIR}change)")}, labels=labels)
+        words = f"share by which the density departs: its {NAMES[wave]} over a turn"
+        labels[f"{DENSITY}{wave}"] = Label(f"{DENSITY}{wave}", words)
+    extra = Extra({**text, **instead(every, DRAG, f"({DRAG} + {AIR}change)")}, labels=labels)
     own = {f"{AIR}{k}": "estimated" for k in range(1, COUNT + 1)} | {f"{AIR}{name}": "fixed" for name in numbers}
     own |= {f"{DENSITY}{wave}": "estimated" for wave in WAVES}
     values: dict[str, Any] = {f"{DENSITY}{wave}": Gaussian(0.0, varies.sigma**2) for wave in WAVES}
@@ -110,14 +128,16 @@ def departure(given: Setup, estimate: Estimate, t: Array) -> Array:
     nodes = np.unique(np.concatenate([[start], np.arange(start, t.max(), air.time / PARTS), t[t > start]]))
     _, Phi = follow(given.problem, nodes, estimate.mean[-1], given.chosen.max_step)
     S = np.zeros((7, 7))
-    S[6, 6] = 0.0 if f"{AIR}1" in given.problem.model.names else air.sigma**2  # where it is estimated it is known so far
+    known = f"{AIR}1" in given.problem.model.names  # and of a share of the usual coefficient, else of that of the answer
+    sigma = air.sigma * (1.0 if known else float(value_of(estimate.mean[-1, place])))
+    S[6, 6] = 0.0 if known else sigma**2
     found = {start: S[:6, :6].copy()}
     A = np.zeros((7, 7))
     for when, dt, one in zip(nodes[1:].tolist(), np.diff(nodes).tolist(), Phi, strict=True):
         left = exp(-dt / air.time)
         A[:6, :6], A[:6, 6], A[6, 6] = one[:6, :6], one[:6, place], left
         S = A @ S @ A.T
-        S[6, 6] += air.sigma**2 * (1.0 - left**2)
+        S[6, 6] += sigma**2 * (1.0 - left**2)
         found[when] = S[:6, :6].copy()
     for k in late.tolist():
         out[k] = found.get(float(t[k]), out[k])
@@ -127,5 +147,5 @@ def departure(given: Setup, estimate: Estimate, t: Array) -> Array:
 def _place(given: Setup) -> int | None:
     """Where the coefficient of drag stands, or that of the last part of the time; None where it is not estimated."""
     names = given.problem.model.names
-    own = [n for n in names if n.startswith("cd_a_m") and n.endswith("_log")]
+    own = [n for n in names if n.startswith("cd_a_m") and n.endswith(SHARE)]
     return names.index(own[-1]) if own else None

@@ -21,7 +21,7 @@ from piazzi.determination.common import with_common_errors
 from piazzi.determination.density import with_density
 from piazzi.determination.earlier import Earlier, earlier_of, fresh
 from piazzi.determination.editing import edited
-from piazzi.determination.faults import Faults, named
+from piazzi.determination.faults import CORRELATED, Faults, named
 from piazzi.determination.fit import begun, estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
 from piazzi.determination.holding import Held, held, unasked
@@ -36,6 +36,7 @@ from piazzi.determination.sun_forces import forces_about_the_sun
 from piazzi.determination.unguided import first_look, goes_about_the_sun, unguided
 from piazzi.determination.unknowns import BIAS, CLOCK, SCALE, asked
 from piazzi.determination.verdict import verdict
+from piazzi.determination.whiteness import with_white_fixes
 from piazzi.earth import Epoch
 from piazzi.earth.dates import read_date
 from piazzi.earth.rotation import frame_named
@@ -151,7 +152,7 @@ def ready(given: Setup) -> Setup:
     """The set-up near its answer, with the noise that it shows: of the air where drag matters, of passes that have some."""
     near = approached(given)
     found = with_density(near)
-    return with_common_errors(near if found is near else refined(found))
+    return with_white_fixes(with_common_errors(near if found is near else refined(found)))
 
 
 def fitting_orbits(*tracking: Any, case: Case | None = None, **words: Any) -> InitialOrbits:
@@ -278,6 +279,8 @@ def _answered(given: Setup, estimator: Estimator) -> tuple[Array, Array, Estimat
     """Rows that are kept, why the others are not, the answer from these, and what it leaves: edited until nothing changes."""
     keep = np.ones(len(given.rows), dtype=np.bool_)
     reasons = np.full(len(keep), "", dtype=np.object_)
+    if given.spare is not None:
+        keep, reasons[given.spare] = ~given.spare, CORRELATED
     first = analysis_at(given, given.states)
     robust = getattr(estimator, "loss", None) is not None  # it weighs rows itself
     if first is not None and not robust:

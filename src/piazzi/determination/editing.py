@@ -11,7 +11,7 @@ from math import exp
 import numpy as np
 
 from piazzi.determination.analysis import Analysis
-from piazzi.determination.faults import DUPLICATE, OUTLIER, STATION
+from piazzi.determination.faults import CORRELATED, DUPLICATE, OUTLIER, STATION
 from piazzi.determination.holding import labels_of, passes
 from piazzi.determination.setup import Setup, scale_of
 from piazzi.estimate.chi_square import quantile
@@ -36,7 +36,8 @@ def edited(given: Setup, analysis: Analysis, keep: Array | None = None) -> tuple
     reasons = np.full(len(given.rows), "", dtype=np.object_)
     there = np.isfinite(analysis.whitened)
     some = there.any(axis=1)
-    repeated = duplicates(given)
+    twice = duplicates(given)
+    repeated = twice if given.spare is None else twice | given.spare
     keep = ~repeated if keep is None else keep & ~repeated
     if given.problem.is_noise_free and there[keep].sum() >= given.problem.model.n + SPARE:
         keep = _settled(given, analysis, keep, repeated, there)
@@ -46,14 +47,15 @@ def edited(given: Setup, analysis: Analysis, keep: Array | None = None) -> tuple
         own = (labels == label) & some & ~repeated
         if not keep[own].any() and own.sum() > 1:
             reasons[own] = STATION
-    reasons[repeated] = DUPLICATE
+    reasons[repeated] = CORRELATED
+    reasons[twice] = DUPLICATE
     odd = reasons == OUTLIER
     every = passes(given, some & ~repeated)
     whole = [rows for rows in every if len(rows) > 1 and odd[rows].all()]
     single = odd.copy()
     if len(whole) <= FEW * len(every):  # a pass is one mistake, not as many as it has rows
         single[[row for rows in whole for row in rows]] = False
-    if single.sum() > MOST * some.sum():  # so many are no outliers: the model does not hold, and the verdict says so
+    if single.sum() > MOST * (some & ~repeated).sum():  # so many are no outliers: the model does not hold, as the verdict says
         keep = keep | odd
         reasons[odd] = ""
     return keep, reasons

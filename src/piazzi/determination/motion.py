@@ -120,14 +120,14 @@ def by_parts(name: str, one: Asked, before: Gaussian, first: float, last: float,
 def process(
     name: str, one: Asked, sigma: float, relative: bool, unit: str, definitions: Definitions, numbers: Numbers
 ) -> Extra:
-    """A parameter with a Gauss-Markov process beside it, which is that of its logarithm where it is `relative`."""
+    """A parameter with a Gauss-Markov process beside it, which is a share of it where it is `relative`."""
     state, tau = f"{name}_change", f"{name}_tau"
     numbers.roles[tau], numbers.values[tau] = "fixed", one.what.period
-    text = f"({name}*exp({state}))" if relative else f"({name} + {state})"
-    share = "logarithm by which {} differs" if relative else "{} beside its constant"
+    share = "share by which {} differs" if relative else "{} beside its constant"
     label = Label(one.what.label, f"{share.format(words_of(name))}, correlated over {one.what.per[1:] if one.what.per else ''}")
     own = Process(state, tau, one.what.period, sigma, "" if relative else unit, label)
-    return Extra(instead(definitions, name, text), processes=(own,), labels={state: label})
+    text = {} if relative else instead(definitions, name, f"({name} + {state})")  # coefficients have all that is said of them
+    return Extra(text, processes=(own,), labels={state: label})
 
 
 def manoeuvres(burns: Sequence[Burn], epoch: Epoch, numbers: Numbers) -> Extra:

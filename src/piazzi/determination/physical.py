@@ -1,14 +1,15 @@
-"""What is estimated as results tell it: coefficients, of which the logarithm is estimated, and the air's density over time.
+"""What is estimated as results tell it: coefficients, which are positive, and the density of the air over time.
 
-Coefficients of sunlight and of air are positive.  With a sigma of a share s before the measurements, one sigma of the
-logarithm is a factor of 1 + s either way.
+Of a coefficient of sunlight or of air its share s of a usual value is estimated.  The value is that times
+(s + sqrt(s^2 + 4 a)) / 2 with a = 0.01: above a fifth of the usual it is s to some percent, so that estimators which linearise
+once see a straight line, and it comes near to zero without ever being there, whatever they make of s.  What density departs
+by is added to s.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import log1p
 from typing import Any
 
 import numpy as np
@@ -19,24 +20,48 @@ from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 
 POSITIVE = ("cr_a_m", "cd_a_m")
-LOG, AIR, DENSITY = "_log", "air_", "density_"
+SHARE, AIR, DENSITY = "_share", "air_", "density_"
+BEND = 0.01
+DRAG, WAVES = "cd_a_m_share", ("density_cos", "density_sin")
+USUAL = 1.0 - BEND  # the share of the usual value itself
 
 
-def by_logarithms(numbers: Numbers, extra: Extra, definitions: Mapping[str, str]) -> Extra:
-    """What replaces coefficients that are uncertain by their values before the measurements times exponentials."""
+def value_of(share: Any) -> Any:
+    """The coefficient in units of the usual one."""
+    return 0.5 * (share + np.sqrt(share**2 + 4.0 * BEND))
+
+
+def share_of(value: Any) -> Any:
+    """The share of a coefficient in units of the usual one, which is positive."""
+    return value - BEND / value
+
+
+def slope_of(share: Any) -> Any:
+    """The derivative of `value_of`."""
+    return 0.5 * (1.0 + share / np.sqrt(share**2 + 4.0 * BEND))
+
+
+def by_shares(numbers: Numbers, extra: Extra, definitions: Mapping[str, str]) -> Extra:
+    """What replaces coefficients that are uncertain, or have a process, by their usual values and shares of them."""
     changed: dict[str, str] = {}
     labels: dict[str, Label] = {}
+    processes = {process.state for process in extra.processes}
     for name, role in list(numbers.roles.items()):
-        before = numbers.values.get(name)
-        if role == "fixed" or not name.startswith(POSITIVE) or not isinstance(before, Gaussian):
+        before, varies = numbers.values.get(name), f"{name}_change" in processes
+        if not name.startswith(POSITIVE) or not (varies or (role != "fixed" and isinstance(before, Gaussian))):
             continue
-        mean, spread = float(np.ravel(before.mean)[0]), float(np.ravel(before.covariance)[0]) ** 0.5
-        if not mean > 0.0:
-            raise ValueError(f"{name} is {mean:g} before the measurements; a coefficient that is estimated is positive")
-        numbers.roles[name], numbers.values[name] = "fixed", mean
-        numbers.roles[name + LOG], numbers.values[name + LOG] = role, Gaussian(0.0, log1p(spread / mean) ** 2)
-        changed |= instead({**definitions, **changed}, name, f"({name}*exp({name}{LOG}))")
-        labels[name + LOG] = extra.labels.get(name) or Label(name, words_of(name))
+        total = repr(USUAL)
+        if isinstance(before, Gaussian) and role != "fixed":
+            mean, spread = float(np.ravel(before.mean)[0]), float(np.ravel(before.covariance)[0]) ** 0.5
+            if not mean > 0.0:
+                raise ValueError(f"{name} is {mean:g} before the measurements; a coefficient that is estimated is positive")
+            numbers.roles[name], numbers.values[name] = "fixed", mean
+            numbers.roles[name + SHARE], numbers.values[name + SHARE] = role, Gaussian(USUAL, (spread / mean) ** 2)
+            labels[name + SHARE] = extra.labels.get(name) or Label(name, words_of(name))
+            total = name + SHARE
+        text = f"({name}*({name}_total + sqrt({name}_total**2 + {4.0 * BEND!r}))/2)"
+        changed |= instead({**definitions, **changed}, name, text)
+        changed |= {f"{name}_total": f"{total} + {name}_change" if varies else total}
     return Extra(changed, labels=labels)
 
 
@@ -69,17 +94,25 @@ def said_name(name: str) -> str:
     """The name by which results have a value that is estimated."""
     if is_node(name):
         return DENSITY + name.removeprefix(AIR)
-    return name.removesuffix(LOG) if name.startswith(POSITIVE) else name
+    return name.removesuffix(SHARE) if name.startswith(POSITIVE) else name
 
 
 def said(problem: Problem, mean: Array) -> tuple[Array, Array]:
     """Values (n,) as results have them, and their derivatives (n, n) by those that are estimated."""
+    names = problem.model.names
     values, J = mean.copy(), np.eye(len(mean))
-    for i, name in enumerate(problem.model.names):
-        if name.startswith(POSITIVE) and name.endswith(LOG):
-            values[i] = J[i, i] = float(problem.parameters[said_name(name)]) * np.exp(mean[i])
     where, root = air_of(problem)
     values[where], J[np.ix_(where, where)] = root @ mean[where], root
+    where += [names.index(name) for name in WAVES if name in names]
+    for i, name in enumerate(names):
+        if not (name.startswith(POSITIVE) and name.endswith(SHARE)):
+            continue
+        size, value, slope = float(problem.parameters[said_name(name)]), value_of(mean[i]), slope_of(mean[i])
+        values[i], J[i, i] = size * value, size * slope
+        if name == DRAG:  # density as a share of what it is with this coefficient
+            J[where, i] = -values[where] * slope / value**2
+            values[where] /= value
+            J[np.ix_(where, where)] /= value
     return values, J
 
 
@@ -93,8 +126,8 @@ def believed(problem: Problem, name: str) -> tuple[float, float]:
     value, sigma = float(given.mean[0]), float(np.sqrt(given.covariance[0, 0]))
     if said_name(name) == name:
         return value, sigma
-    size = float(problem.parameters[said_name(name)]) * float(np.exp(value))
-    return size, size * sigma
+    size = float(problem.parameters[said_name(name)])
+    return size * float(value_of(value)), size * float(slope_of(value)) * sigma
 
 
 def at_rest(problem: Problem, names: Sequence[str]) -> Problem:

@@ -14,7 +14,7 @@ from piazzi.determination.earlier import Earlier, root_of
 from piazzi.determination.guesses import Guess
 from piazzi.determination.motion import Extra, process_noise, with_processes
 from piazzi.determination.orbit_forces import Chosen
-from piazzi.determination.physical import AIR, LOG, POSITIVE, at_rest, said_name
+from piazzi.determination.physical import AIR, DRAG, POSITIVE, SHARE, USUAL, WAVES, at_rest, is_node, said_name, slope_of
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import Label
 from piazzi.earth import EphemerisWarning, Epoch
@@ -41,6 +41,7 @@ class Setup:
     earlier : what was known before, None for no more than a guess
     before : (n,) and (n, n), that at the first epoch with a lower triangular root of its covariance
     solution : index of the epoch at which the answer stands
+    spare : (J,), rows that are set aside, because they say what others say; None for none
     """
 
     measured: Measured
@@ -54,6 +55,7 @@ class Setup:
     assumed: tuple[str, ...]
     earlier: Earlier | None = None
     before: tuple[Array, Array] | None = None
+    spare: Array | None = None
 
     __repr__ = brief
 
@@ -149,16 +151,20 @@ def _known(problem: Problem, earlier: Earlier, t: float, first: float) -> tuple[
     mean, P = problem.prior.mean.copy(), problem.prior.covariance.copy()
     own = [i for i, name in enumerate(names) if name in known]
     where = [known[names[i]] for i in own]
-    scale, centre = np.ones(len(own)), np.zeros(len(own))
+    J, values = np.eye(len(own)), earlier.mean[where]
     for k, i in enumerate(own):
-        size = earlier.mean[where[k]]
-        if names[i].startswith(POSITIVE) and names[i].endswith(LOG):
-            parameters[said_name(names[i])], scale[k], centre[k] = size, 1.0 / size, size
-        elif names[i].startswith(AIR):
-            scale[k] = 1.0 / parameters[f"{AIR}sigma"]
+        if names[i].startswith(POSITIVE) and names[i].endswith(SHARE):
+            parameters[said_name(names[i])] = size = float(values[k])
+            J[k, k], values[k] = 1.0 / (size * slope_of(USUAL)), USUAL
+    air = [k for k, i in enumerate(own) if is_node(names[i]) or names[i] in WAVES]
+    for k in air:  # shares of what the coefficient makes
+        if DRAG in known and DRAG in names:
+            J[k, own.index(names.index(DRAG))] = values[k] / parameters[said_name(DRAG)]
+    for k in (k for k in air if is_node(names[own[k]])):
+        values[k], J[k] = values[k] / parameters[f"{AIR}sigma"], J[k] / parameters[f"{AIR}sigma"]
     P[own, :] = P[:, own] = 0.0
-    mean[own] = (earlier.mean[where] - centre) * scale
-    P[np.ix_(own, own)] = earlier.covariance[np.ix_(where, where)] * np.outer(scale, scale)
+    mean[own] = values
+    P[np.ix_(own, own)] = J @ earlier.covariance[np.ix_(where, where)] @ J.T
     problem = replace(problem, prior=Gaussian(mean, P), prior_time=t, parameters=parameters)
     found = propagate(problem, np.array([first]))
     return problem, (found.mean[0], root_of(found.covariance[0]))
