@@ -68,7 +68,7 @@ def _about(given: Setup) -> Chosen:
     chosen, name = given.chosen, said_name(DRAG)
     old, before = float(chosen.values[name]), chosen.values[DRAG]
     new = max(_coefficient(given), LEAST * old)
-    scaled = Gaussian(share_of(old / new), float(before.covariance[0, 0]) * (old / new) ** 2)
+    scaled = Gaussian(share_of(old / new), float(np.ravel(before.covariance)[0]) * (old / new) ** 2)
     return replace(chosen, values={**chosen.values, name: new, DRAG: scaled})
 
 
