@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piazzi.evaluate.quantities import display_of, duration, number, with_sigma
+from piazzi.evaluate.quantities import display_of, displays, duration, number, with_sigma
 
 
 @given(st.floats(-1e300, 1e300), st.integers(1, 12))
@@ -76,3 +76,12 @@ def test_units_follow_the_size(unit, values, shown, factor):
 )  # fmt: skip
 def test_durations_have_the_unit_that_suits_them(seconds, text):
     assert duration(seconds) == text
+
+
+def test_a_group_has_one_unit_and_what_is_in_none_its_own():
+    """A velocity of kilometres a second may have one component of metres; a bias of centimetres is no part of a position."""
+    units = ["m", "m", "m", "m/s", "m/s", "m", "rad"]
+    values = [[7e6], [12.0], [None], [7.5e3], [-19.0], [0.02], [1.0]]
+    shown = displays(units, values, [range(3), (3, 4)])
+    assert [show.unit for show in shown] == ["km", "km", "km", "km/s", "km/s", "m", "deg"]
+    assert [show.unit for show in displays(["m", "m", "m/s"], [[2e4], [1.0], [1.0]])] == ["km", "km", "m/s"]

@@ -12,7 +12,7 @@ from piazzi.determination.physical import believed, said_name
 from piazzi.determination.setup import Setup
 from piazzi.determination.verdict import apart_by
 from piazzi.evaluate.grids import Grid, as_html, as_rich
-from piazzi.evaluate.quantities import display_of, number, with_sigma
+from piazzi.evaluate.quantities import display_of, displays, number, with_sigma
 from piazzi.text import printable
 
 if TYPE_CHECKING:
@@ -61,9 +61,9 @@ def grids(found: Any, facts: dict[str, Any]) -> list[Grid]:
 
 def _state(facts: dict[str, Any]) -> Grid:
     rows = []
-    for name, unit, *numbers in zip(*(facts[k] for k in ("names", "units", "mean", "sigma")), strict=True):
+    shows = displays(facts["units"], [[v] for v in facts["mean"]], [range(3), range(3, 6)])
+    for show, name, *numbers in zip(shows, *(facts[k] for k in ("names", "mean", "sigma")), strict=True):
         value, sigma = (np.nan if v is None else v for v in numbers)
-        show = display_of(unit, [value])
         rows.append((name, *with_sigma(value * show.factor, sigma * show.factor), show.unit))
     return Grid(f"State at {facts['epoch']}, {facts['frame']}", ("", "value", "sigma", "unit"), tuple(rows))
 
@@ -78,9 +78,12 @@ def _elements(facts: dict[str, Any]) -> Grid:
 
 
 def _residuals(facts: dict[str, Any]) -> Grid:
-    rows = []
-    for one in facts["residuals"]:
-        show = display_of(one["unit"], [one["rms"]])
+    rows, found = [], facts["residuals"]
+    kinds = {
+        kind: [i for i, one in enumerate(found) if one["component"] == kind] for kind in {one["component"] for one in found}
+    }
+    shows = displays([one["unit"] for one in found], [[one["rms"]] for one in found], kinds.values())
+    for one, show in zip(found, shows, strict=True):
         values = [None if one[k] is None else one[k] * show.factor for k in ("mean", "rms")]
         rows.append((
             one["station"], one["component"], f"{one['used']}/{one['count']}", *(number(v, 3) for v in values), show.unit,

@@ -13,7 +13,7 @@ from piazzi.drawn import Drawn
 from piazzi.evaluate.attempts import Attempt
 from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
 from piazzi.evaluate.information import Information
-from piazzi.evaluate.quantities import display_of, finite, number
+from piazzi.evaluate.quantities import displays, finite, number
 from piazzi.evaluate.twins import Twin
 from piazzi.evaluate.verdict import AS_THE_PRIOR, conclusion, local, twins_found, unreliable, weakest
 from piazzi.problem import Problem, Tracking
@@ -207,8 +207,8 @@ def _states(found: Observability) -> Grid:
     heads += [] if more is None else ["with the\nfurther stations"]
     rows = []
     sigma = np.sqrt(np.diag(found.problem.covariance))
-    for i, name in enumerate(model.names):
-        show = display_of(model.unit(name), [found.state[i]])
+    shows = displays([model.unit(name) for name in model.names], [[v] for v in found.state], model.group_indices.values())
+    for i, (name, show) in enumerate(zip(model.names, shows, strict=True)):
         values = [found.state[i], sigma[i], found.crlb_sigma[i]]
         values += [] if found.without_noise is None else [found.without_noise.crlb_sigma[i]]
         values += [] if more is None else [more.crlb_sigma[i]]

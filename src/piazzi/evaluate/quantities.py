@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import floor, inf, isfinite, log10, pi, sqrt
 
@@ -36,6 +36,24 @@ def display_of(unit: str, values: Iterable[float | None] = ()) -> Display:
     largest = max((abs(v) for v in values if v is not None and isfinite(v)), default=0.0)
     name, factor, start = _LARGE.get(unit, (unit, 1.0, inf))
     return Display(name, factor) if largest >= start else Display(unit)
+
+
+def displays(
+    units: Sequence[str], values: Sequence[Iterable[float | None]], groups: Iterable[Sequence[int]] = ()
+) -> list[Display]:
+    """For each quantity the unit to show it in: one for all of a group of them; those in no group, by what their unit is.
+
+    Parameters
+    ----------
+    units, values : of every quantity, SI
+    groups : places of quantities that are shown alike, such as the components of a position
+    """
+    of = {i: n for n, group in enumerate(groups) for i in group}
+    together: dict[tuple[int, str], list[float | None]] = {}
+    keys = [(of.get(i, -1), unit) for i, unit in enumerate(units)]
+    for key, own in zip(keys, values, strict=True):
+        together.setdefault(key, []).extend(own)
+    return [display_of(unit, together[key]) for key, unit in zip(keys, units, strict=True)]
 
 
 def number(value: float | None, digits: int = 4) -> str:

@@ -10,7 +10,7 @@ from piazzi.estimate.chi_square import quantile
 from piazzi.evaluate.attempts import Attempt
 from piazzi.evaluate.information import Information
 from piazzi.evaluate.judgement import CLEARLY
-from piazzi.evaluate.quantities import display_of, number
+from piazzi.evaluate.quantities import displays, number
 from piazzi.evaluate.twins import Twin
 from piazzi.model import Model
 from piazzi.problem.checks import Array
@@ -47,8 +47,9 @@ def local(
         many = f"{blind} of {model.n} directions of the first state {'is' if blind == 1 else 'are'} not observable"
         return [f"Observability: {many}: a step along {direction} changes no measurement; no bound for {', '.join(unseen)}."]
     sigmas = []
-    for name, s in zip(model.names, found.crlb_sigma.tolist(), strict=True):
-        show = display_of(model.unit(name), [s])
+    bounds = found.crlb_sigma.tolist()
+    shows = displays([model.unit(name) for name in model.names], [[s] for s in bounds], model.group_indices.values())
+    for name, s, show in zip(model.names, bounds, shows, strict=True):
         sigmas.append(f"{name} {number(s * show.factor, 3)}{show.suffix}")
     smallest = float(found.singular_values[-1])
     how = "to" if smallest > AS_THE_PRIOR else "only to"

@@ -11,7 +11,8 @@ from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.forecast import Forecast
 from piazzi.evaluate.grids import rich_table
 from piazzi.evaluate.metrics import errors, residual_rms
-from piazzi.evaluate.quantities import display_of, duration, number, with_sigma
+from piazzi.evaluate.quantities import Display, display_of, displays, duration, number, with_sigma
+from piazzi.model import Model
 from piazzi.problem import Problem, Tracking, epoch_of
 from piazzi.problem.checks import Array
 from piazzi.problem.gaps import in_passes
@@ -75,15 +76,20 @@ def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
     heads = ("state", "estimate", "sigma", *(["error"] if error is not None else []), "unit")
     rows = []
     sigmas = np.sqrt(np.maximum(np.diagonal(estimate.covariance[k]), 0.0))
-    for i, state in enumerate(estimate.names):
+    shows = _shows(estimate.problem.model, estimate.names, [[v] for v in estimate.mean[k].tolist()])
+    for i, (state, show) in enumerate(zip(estimate.names, shows, strict=True)):
         value, sigma = float(estimate.mean[k, i]), float(sigmas[i])
-        show = display_of(estimate.problem.model.unit(state), [value])
         texts = [*with_sigma(value * show.factor, sigma * show.factor)]
         if error is not None:
             e = float(error[k, i]) * show.factor
             texts.append(with_sigma(e, sigma * show.factor)[0] if np.isfinite(e) else "-")
         rows.append((state, *texts, printable(show.unit)))
     return Group(Text(printable(title), style="bold"), _table(heads, rows))
+
+
+def _shows(model: Model, names: Sequence[str], values: Sequence[Sequence[float]]) -> list[Display]:
+    """The unit of every state: one for all of a group."""
+    return displays([model.unit(name) for name in names], values, model.group_indices.values())
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
@@ -123,7 +129,7 @@ def forecast_table(name: str, forecast: Forecast) -> Any:
     date = _date(forecast.problem.epoch, forecast.start)
     title = f"Predicted from t = {forecast.start:g} s{date}, {name}, without measurements"
     rows = []
-    shows = [display_of(forecast.problem.model.unit(s), forecast.mean[:, i].tolist()) for i, s in enumerate(forecast.names)]
+    shows = _shows(forecast.problem.model, forecast.names, forecast.mean.T.tolist())
     for k, t in enumerate(forecast.times.tolist()):
         for i, (state, show) in enumerate(zip(forecast.names, shows, strict=True)):
             ahead = duration(t - forecast.start) if i == 0 else ""
@@ -137,8 +143,7 @@ def truth_table(problem: Problem, tracking: Tracking) -> Any:
     """A rich table of the true state at the first and last epoch."""
     rows = []
     if tracking.truth is not None:
-        for i, state in enumerate(problem.model.names[: tracking.truth.shape[1]]):
-            ends = [float(tracking.truth[0, i]), float(tracking.truth[-1, i])]
-            show = display_of(problem.model.unit(state), ends)
+        names, both = problem.model.names[: tracking.truth.shape[1]], tracking.truth[[0, -1]].T.tolist()
+        for state, ends, show in zip(names, both, _shows(problem.model, names, both), strict=True):
             rows.append((state, *(number(v * show.factor, 6) for v in ends), printable(show.unit)))
     return _table(("true state", *(f"t = {t:g} s" for t in (tracking.times[0], tracking.times[-1])), "unit"), rows)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from piazzi.evaluate.quantities import Display, display_of, duration, with_sigma
+from piazzi.evaluate.quantities import Display, display_of, displays, duration, with_sigma
 from piazzi.present.colours import station_colour
 from piazzi.present.figures.measured import kinds_of, residuals_of
 from piazzi.present.report.blocks import Axis, Chart, Line, Section, Table
@@ -46,9 +46,10 @@ def measured(views: Views) -> Section:
 
 def _last(views: Views) -> Table:
     model, rows = views.comparison.problem.model, []
-    for i, name in enumerate(model.names):
+    ends = np.array([e.mean[-1] for e in views.estimates]).T.tolist()
+    shows = displays([model.unit(name) for name in model.names], ends, model.group_indices.values())
+    for i, (name, show) in enumerate(zip(model.names, shows, strict=True)):
         last = [(float(e.mean[-1, i]), float(sigmas_of(e)[-1, i])) for e in views.estimates]
-        show = display_of(model.unit(name), [value for value, _ in last])
         cells = [" ± ".join(with_sigma(value * show.factor, sigma * show.factor)) for value, sigma in last]
         rows.append((name, *cells, show.unit))
     when = duration(float(views.comparison.tracking.times[-1] - views.comparison.tracking.times[0]))
