@@ -4,9 +4,11 @@ import gzip
 import json
 import os
 
+import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi import earth
 
 
 @pytest.fixture
@@ -68,6 +70,28 @@ def test_pictures_and_conversions_are_written(call, tdm, tmp_path, data_dir):
     assert "TRAJ_TYPE = CARTPV" in (tmp_path / "g.ocm").read_text()
 
 
+def test_mean_elements_are_fitted_and_read_by_another_package(call, tmp_path, data_dir):
+    from sgp4 import omm
+    from sgp4.api import Satrec
+
+    cpf = data_dir / "earth/lageos2/lageos2_cpf_160213_5441.sgf"
+    for ending in ("tle", "omm"):
+        assert call("tracking", cpf, "--to", tmp_path / f"a.{ending}").status == 0
+    one, two = (tmp_path / "a.tle").read_text().splitlines()[-2:]
+    (mean,) = pz.read_ephemeris(tmp_path / "a.omm").mean
+    lines = [line.split(" = ") for line in (tmp_path / "a.omm").read_text().splitlines() if " = " in line]
+    by_omm = Satrec()
+    omm.initialize(by_omm, {"EPHEMERIS_TYPE": 0, **{key: value.split(" [")[0] for key, value in lines}})
+    by_lines = Satrec.twoline2rv(one, two)
+    (arc,) = pz.read_ephemeris(cpf).arcs
+    for k in (0, 150, 287):
+        when = arc.epoch + float(arc.t[k])
+        there = earth.transform(arc.position[k], None, "ITRF", "TEME", when)[0]
+        for elements in (by_lines, by_omm):
+            failed, r, _ = elements.sgp4(*when.jd("UTC"))
+            assert not failed and np.linalg.norm(1e3 * np.array(r) - there) < 3e3, mean.name
+
+
 @pytest.mark.parametrize("name", ["ilrs/lageos2_201802.npt.v2C", "ccsds/odm/oem/OEMExample5.txt", "tdm/TDMExample15.xml"])
 def test_every_format_is_shown(call, data_dir, name):
     assert call("tracking", data_dir / name).status == 0
@@ -77,7 +101,7 @@ def test_every_format_is_shown(call, data_dir, name):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--to", "a.xyz"], "must end in .tdm, .csv, .oem, .opm, .ocm"),
+        (["--to", "a.xyz"], "must end in .tdm, .csv, .oem, .opm, .ocm, .omm, .tle"),
         (["-o", "a.txt"], "must end in .png, .pdf, .svg"),
         (["--to", "no/such/folder/a.csv"], "there is no folder"),
         (["--to", "a.oem"], "the file holds measurements, no orbit"),

@@ -121,6 +121,9 @@ def test_other_programs_read_the_products(found, tmp_path):
     found.write(tmp_path / "a.tle")
     one, two = (tmp_path / "a.tle").read_text().splitlines()[-2:]
     elements = Satrec.twoline2rv(one, two)
+    found.write(tmp_path / "a.omm")
+    (mean,) = pz.read_ephemeris(tmp_path / "a.omm").mean
+    assert abs(dict(mean.elements)["mean_motion"] - elements.no_kozai / 60.0) < 1e-9 * elements.no_kozai
     for t in (0.0, 43200.0, T[-1]):
         epoch = EPOCH + t
         failed, r, v = elements.sgp4(*epoch.jd("UTC"))

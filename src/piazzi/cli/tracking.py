@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from piazzi.formats import Observations
 
 PICTURES = (".png", ".pdf", ".svg")
-ORBITS = (".oem", ".opm", ".ocm")
+ORBITS = (".oem", ".opm", ".ocm", ".omm", ".tle")
 TARGETS = (".tdm", ".csv", *ORBITS)
 
 
@@ -23,7 +23,7 @@ TARGETS = (".tdm", ".csv", *ORBITS)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True)
 @options.output("Draw when what was measured, as .png, .pdf or .svg.")
 @results.title_option
-@click.option("--to", "target", metavar="FILE", help="Convert, to .tdm or .csv; orbits to .oem, .opm or .ocm.")
+@click.option("--to", "target", metavar="FILE", help="Convert, to .tdm or .csv; orbits to .oem, .opm, .ocm, .omm or .tle.")
 @options.as_json
 @conventions
 def command(files: tuple[str, ...], output_file: str | None, target: str | None, as_json: bool, **answers: Any) -> int:
@@ -99,6 +99,12 @@ def _orbit_text(file: str, ending: str) -> str:
     from piazzi.formats.write_odm import oem_text, opm_text
 
     found = read_ephemeris(file)
+    if ending in (".omm", ".tle"):
+        from piazzi.formats.tle import tle_text
+        from piazzi.formats.write_odm import omm_text
+        from piazzi.orbit import fit_sgp4
+
+        return (tle_text if ending == ".tle" else omm_text)(fit_sgp4(found).mean)
     if ending == ".oem":
         return oem_text(found)
     if len(found.arcs) != 1:

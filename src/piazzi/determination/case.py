@@ -91,8 +91,8 @@ class Case:
         "default", "FORCES", 'default, none, or "gravity=EGM2008 degree=40 drag=exponential".  [default: default]', usual=True
     )
     output: tuple[str, ...] = asked(
-        (), "FILE", "Write .oem, .opm, .ocm, .tle, .nc, .csv or .json; may be repeated.", read.texts, many=True, usual=True,
-        flags=("-o", "--output"),
+        (), "FILE", "Write .oem, .opm, .ocm, .omm, .tle, .nc, .csv or .json; may be repeated.", read.texts, many=True,
+        usual=True, flags=("-o", "--output"),
     )  # fmt: skip
     report: str | None = asked(
         None, "DIR", "Write report.html into DIR: one page that works offline; DIR may end in .html.", usual=True

@@ -19,7 +19,7 @@ from piazzi.determination.document import document, solution
 from piazzi.determination.residuals import table
 from piazzi.earth import Epoch
 from piazzi.earth.eop import mjd_text, tables
-from piazzi.formats import ocm_text, oem_text, opm_text
+from piazzi.formats import MeanElements, ocm_text, oem_text, omm_text, opm_text
 from piazzi.formats.tle import tle_text
 from piazzi.io import hdf5
 from piazzi.io.atomic import atomic_path
@@ -27,7 +27,7 @@ from piazzi.io.scenario_text import scenario_text
 from piazzi.orbit import fit_sgp4
 from piazzi.text import escape_formula, printable
 
-ENDINGS = (".oem", ".opm", ".ocm", ".tle", ".nc", ".csv", ".json", ".toml")
+ENDINGS = (".oem", ".opm", ".ocm", ".omm", ".tle", ".nc", ".csv", ".json", ".toml")
 MESSAGES = (".oem", ".opm", ".ocm")  # that have comments
 LONGEST = 240  # of a comment
 
@@ -51,8 +51,8 @@ def write(found: Any, path: Any, *, span: Any = None, step: float | None = None,
     formal : whether covariances are written as computed where the verdict calls them too small; default what the case says
     """
     ending = check_ending(path)
-    if ending == ".tle" and found.setup.measured.about != "earth":
-        raise ValueError(f"-o {path}: two lines of elements are of orbits about the Earth; write .oem, .opm or .json")
+    if ending in (".tle", ".omm") and found.setup.measured.about != "earth":
+        raise ValueError(f"-o {path}: mean elements of SGP4 are of orbits about the Earth; write .oem, .opm or .json")
     if ending == ".nc":
         _dataset(found, path)
         return
@@ -63,7 +63,8 @@ def write(found: Any, path: Any, *, span: Any = None, step: float | None = None,
         ".ocm": lambda: ocm_text(
             ephemeris(found, span, step, formal=formal).arcs[0], determination=block(found), basis="DETERMINED", originator=who
         ),
-        ".tle": lambda: _elements(found, span, step),
+        ".omm": lambda: omm_text(_elements(found, span, step), originator=who),
+        ".tle": lambda: tle_text(_elements(found, span, step)),
         ".csv": lambda: residual_text(found),
         ".json": lambda: json.dumps(document(found), allow_nan=False, indent=1) + "\n",
         ".toml": lambda: problem_text(found),
@@ -74,12 +75,12 @@ def write(found: Any, path: Any, *, span: Any = None, step: float | None = None,
         work.write_text(text, encoding="utf-8")
 
 
-def _elements(found: Any, span: Any, step: float | None) -> str:
-    """Two-line elements by a fit to the orbit over the span."""
+def _elements(found: Any, span: Any, step: float | None) -> MeanElements:
+    """Mean elements of SGP4 by a fit to the orbit over the span."""
     mean = fit_sgp4(ephemeris(found, span, step, "TEME")).mean
     if found.case.norad is not None:
-        mean = replace(mean, said=(*mean.said, ("NORAD_CAT_ID", str(found.case.norad))))
-    return tle_text(mean)
+        mean = replace(mean, said=tuple({**dict(mean.said), "NORAD_CAT_ID": str(found.case.norad)}.items()))
+    return mean
 
 
 def problem_text(found: Any) -> str:

@@ -122,7 +122,8 @@ def omm_text(mean: MeanElements, *, originator: str = "PIAZZI", created: str | N
     """An OMM (CCSDS 502.0-B-3, KVN) of mean elements, with the parameters of two-line elements as they were given."""
     said = dict(mean.said)
     lines = [*_header("OMM", originator, created), *_metadata(mean), f"MEAN_ELEMENT_THEORY = {plain(mean.theory)}"]
-    lines += [f"EPOCH = {date(mean.scale or '', mean.epoch)}", *_quantities(mean.elements, ELEMENTS)]
+    epoch = date(mean.scale or "", mean.epoch)  # readers of others want a fraction of the second
+    lines += [f"EPOCH = {epoch if '.' in epoch else f'{epoch}.0'}", *_quantities(mean.elements, ELEMENTS)]
     lines += _quantities(mean.spacecraft, SPACECRAFT)
     lines += [f"{keyword} = {plain(said[keyword])}" for keyword in TLE if keyword in said]
     if mean.covariance:

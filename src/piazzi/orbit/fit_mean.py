@@ -127,7 +127,8 @@ def _mean(x: Array, about: dict[str, Any]) -> MeanElements:
     elements = (("mean_motion", n), ("eccentricity", float(np.hypot(h, k))))
     return MeanElements(
         theory="SGP4", elements=(*elements, *zip(names, map(float, wrapped), strict=True)), centre="EARTH", frame="TEME",
-        scale="UTC", said=(("EPHEMERIS_TYPE", "0"), ("BSTAR", repr(drag)), ("MEAN_MOTION_DOT", "0.0"),
+        scale="UTC", said=(("EPHEMERIS_TYPE", "0"), ("CLASSIFICATION_TYPE", "U"), ("NORAD_CAT_ID", "0"),
+        ("ELEMENT_SET_NO", "0"), ("REV_AT_EPOCH", "0"), ("BSTAR", repr(drag)), ("MEAN_MOTION_DOT", "0.0"),
         ("MEAN_MOTION_DDOT", "0.0")),
         **about,
     )  # fmt: skip
