@@ -5,7 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.determination.initial_result import InitialOrbits, UndeterminedError
+from piazzi.determination.centres import centre_of
+from piazzi.determination.initial import _why_not
+from piazzi.determination.initial_result import InitialOrbits, OrbitMode, UndeterminedError
 from piazzi.determination.ridge import OPEN, _ends, _speeds, openness, ridge
 from piazzi.orbit import propagate_kepler
 from piazzi.orbit.modes import two_body_modes
@@ -108,3 +110,19 @@ def test_a_ridge_is_told_and_can_be_sent_to_other_processes():
     error = UndeterminedError(found)
     assert "a ridge, no orbit" in str(error)
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
+
+
+@pytest.mark.parametrize(
+    ("speed", "says"),
+    [(1.0, ""), (0.3, "through the Earth, down to"), (1.45, "not bound"), (1.4, "farther than")],
+)
+def test_what_is_no_orbit_for_a_whole_turn_is_said(speed, says):
+    """Across the radius at a share of the circular speed: the other apsis is at r s^2 / (2 - s^2)."""
+    r = 7e6
+    state = np.array([r, 0.0, 0.0, 0.0, speed * np.sqrt(EARTH / r), 0.0])
+    found = _why_not(state, ABOUT_EARTH, centre_of("earth"))
+    assert says in found and bool(found) == bool(says)
+    if speed < 1.0:
+        assert f"{r * speed**2 / (2 - speed**2) / 1e3:,.0f} km" in found
+    told = InitialOrbits((OrbitMode(EPOCH, state, np.eye(6), 1.0, 1.0, 6, found),), 1, 1)
+    assert (found in str(told)) and told.to_dict()["modes"][0]["why_not"] == found

@@ -171,16 +171,18 @@ def solved(kind, seed):
 
 if __name__ == "__main__":
     kind, count = sys.argv[1], int(sys.argv[2])
-    missed, seconds, said, squares = [], [], [], []
+    missed, seconds, own, said, squares = [], [], [], [], []
     for seed in range(count):
-        started = time.perf_counter()
+        started, spent = time.perf_counter(), time.process_time()
         search, found, off = solved(kind, seed)
         seconds.append(time.perf_counter() - started)
+        own.append(time.process_time() - spent)
         if found is None:
             missed.append(seed)
         said += [(m.probability, k == found) for k, m in enumerate(search.modes) if m.probability > 1e-3]
         squares += [] if found is None else [off[found]]
-    print(f"{kind}: found {count - len(missed)} of {count}, median {np.median(seconds):.2f} s with simulation, missed {missed}")
+    print(f"{kind}: found {count - len(missed)} of {count}, missed {missed}")
+    print(f"  median {np.median(seconds):.2f} s with simulation, {np.median(own):.2f} s of a processor")
     print(f"  mean squared distance from the truth {np.mean(squares):.2f} (6 or 7 is right), median {np.median(squares):.2f}")
     said = np.array(said)
     for low_end, high_end in ((0, 0.05), (0.05, 0.2), (0.2, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from piazzi.problem.checks import Array
 
 ENOUGH = 5  # rows of a stretch
 MOST = 6  # two-body orbits that are refined
+THROUGH = "no orbit for a whole turn"
 WIDEST = 16.0  # stretches, within which two-body motion still says what to begin with
 
 
@@ -61,6 +63,7 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None =
         what = ridge(rows.of(first), region, problem.epoch, known)
         return InitialOrbits((), search.starts, search.fits, None, centre.name, what, beyond)
     modes = weighed(found) or tuple(_unrefined(problem, search, inside[:MOST], len(np.unique(index[first]))))
+    modes = tuple(replace(mode, why_not=_why_not(mode.mean, region, centre)) for mode in modes)
     apart = _apart(problem, tracking, modes, centre) if len(modes) > 1 else None
     return InitialOrbits(modes, search.starts, search.fits, apart, centre.name, None, beyond)
 
@@ -130,6 +133,20 @@ def first_stretch(times: Array, length: float, longest: float = np.inf) -> Array
         if held[k] >= min(ENOUGH, len(t)) or length > min(t[-1] - t[0], longest / 1.5):
             return order[k : last[k]]
         length *= LONGER
+
+
+def _why_not(state: Array, region: Region, centre: Centre) -> str:
+    """Why a state (6,) is on no admissible orbit; empty for one that is."""
+    if region.holds(state[None])[0]:
+        return ""
+    r, h = float(np.linalg.norm(state[:3])), np.cross(state[:3], state[3:])
+    inverse = 2.0 / r - float(state[3:] @ state[3:]) / region.mu  # of the semi-major axis
+    p = float(h @ h) / region.mu
+    nearest = p / (1.0 + np.sqrt(max(1.0 - p * inverse, 0.0)))
+    if nearest <= region.lowest:
+        through = "through the Earth" if centre.name == "earth" else "into the Sun"
+        return f"{THROUGH}: it goes {through}, down to {nearest / 1e3:,.0f} km from the centre"
+    return "it is not bound" if inverse <= 0.0 else f"it goes farther than {region.highest / 1e3:,.0f} km from the centre"
 
 
 def _unrefined(problem: Problem, search: Search, modes: list[Mode], rows: int) -> Iterator[OrbitMode]:

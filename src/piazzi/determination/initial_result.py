@@ -30,6 +30,7 @@ class OrbitMode:
     probability : among all that fit, by Laplace's approximation of the evidence, before the full model if none of it ended
     weighted_rms : of the residuals in their sigmas
     rows : how many it was fitted to
+    why_not : why it is no orbit that a body can be on for a whole turn, such as one through the Earth; empty for others
     """
 
     epoch: Epoch
@@ -38,6 +39,7 @@ class OrbitMode:
     probability: float
     weighted_rms: float
     rows: int
+    why_not: str = ""
 
     @property
     def prior(self) -> Gaussian:
@@ -49,7 +51,7 @@ class OrbitMode:
         return {
             "probability": self.probability, "epoch": str(self.epoch) if scale is None else self.epoch.to(scale),
             "mean": self.mean.tolist(), "covariance": self.covariance.tolist(), "weighted_rms": self.weighted_rms,
-            "rows": self.rows,
+            "rows": self.rows, "why_not": self.why_not,
         }  # fmt: skip
 
 
@@ -143,6 +145,7 @@ class InitialOrbits:
             r, v = np.linalg.norm(mode.mean[:3]) / 1e3, np.linalg.norm(mode.mean[3:])
             where = f"{r:,.1f} km from the centre at {v:,.1f} m/s on {mode.epoch}"
             lines.append(f"  probability {mode.probability:.3f}: {where}, weighted RMS {mode.weighted_rms:.2f} of {mode.rows}")
+            lines += [f"    {mode.why_not}"] if mode.why_not else []
         if self.apart is not None:
             lines.append(f"The first two part by {self.apart}")
         return "\n".join([*lines, *rest])

@@ -9,7 +9,7 @@ import numpy as np
 
 from piazzi.determination.centres import EARTH, SUN, Centre
 from piazzi.determination.guesses import Guess
-from piazzi.determination.initial import first_stretch, initial_orbits
+from piazzi.determination.initial import THROUGH, first_stretch, initial_orbits
 from piazzi.determination.initial_result import InitialOrbits, UndeterminedError
 from piazzi.determination.sensing import Measured
 from piazzi.determination.sights import plain_rows
@@ -111,6 +111,8 @@ def unguided(seen: Measured, pose: Callable[[Guess], Problem]) -> Guess:
         fits = f"an orbit fits {found.modes[0].rows} measurements from {found.modes[0].epoch} on"
         raise ValueError(f"{fits}, but {found.beyond}: give them apart, or say where to begin with --guess")
     best = found.modes[0]
+    if THROUGH in best.why_not:
+        raise ValueError(f"the measurements fit no other orbit than one that is {best.why_not}")
     words = "the only orbit that fits" if len(found.modes) == 1 else f"the most probable of {len(found.modes)} orbits that fit"
     told = f"{words}, of {found.starts} starts"
     said = (f"the fit begins at {told}",)
