@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     from piazzi.outside.function import Function
     from piazzi.outside.interpolation import Interpolation
     from piazzi.outside.table import Table
+    from piazzi.present.progress import progress
     from piazzi.present.report import write_report
     from piazzi.problem import (
         Gaussian,
@@ -128,6 +129,7 @@ _WHERE = {
         "piazzi.evaluate.window_lengths": "windows",
         "piazzi.evaluate.window_trade": "WindowTrade",
         "piazzi.study": "Study read_store",
+        "piazzi.present.progress": "progress",
         "piazzi.present.report": "write_report",
         "piazzi.determination.determining": "determine",
         "piazzi.determination.ephemerides": "ephemeris",
@@ -152,7 +154,7 @@ __all__ = [
     "RungeKutta", "RungeKutta4", "RungeKutta8", "Schedule", "Sensor", "SlidingWindow", "Smoother", "SquareRootKalmanFilter",
     "Station", "Study", "Table", "Taylor", "Tracking", "Truth", "Tukey", "UnscentedKalmanFilter", "Updated", "WindowTrade",
     "choose_substeps", "compare", "determine", "difference", "earth", "ephemeris", "figures", "formats", "initial_orbits",
-    "kepler_transition", "load", "observability", "orbit", "passes", "predict", "propagate", "propagate_kepler",
+    "kepler_transition", "load", "observability", "orbit", "passes", "predict", "progress", "propagate", "propagate_kepler",
     "read_ephemeris", "read_store", "read_tracking", "save", "scenarios", "simulate", "step_warning", "substep_error",
     "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip

@@ -271,3 +271,22 @@ def test_the_command_and_hostile_names_are_text(open_page, found, tmp_path):
     assert page.evaluate("() => window.hacked") is None
     assert page.locator("img").count() == 0
     assert hostile in page.locator("pre").inner_text()
+
+
+@pytest.mark.slow
+def test_a_page_of_two_thousand_measurements_is_small_and_quick(browser, tmp_path):
+    """At most 1.5 MB, and ready to be used within a second of being asked for, the best of three times."""
+    t = 60.0 * np.arange(667)
+    noisy = truth(t)[:, :3] + SIGMA * np.random.default_rng(1).standard_normal((len(t), 3))
+    many = pz.determine(observations(noisy, t, SIGMA))
+    assert len(table(many)["t"]) >= 2000
+    path = many.report(tmp_path / "page.html")
+    assert path.stat().st_size <= 1.5e6
+    times = []
+    for _ in range(3):
+        page = browser.new_page()
+        page.goto(path.as_uri())
+        page.wait_for_selector("html[data-ready]")
+        times.append(page.evaluate("performance.now()"))
+        page.close()
+    assert min(times) < 1000.0
