@@ -126,6 +126,21 @@ def test_an_orbit_without_a_covariance_is_a_guess_only(noisy, tmp_path):
         pz.determine(observations(noisy, T, SIGMA), from_=EPOCH)
 
 
+def test_a_prior_of_after_the_first_new_row_is_refused_with_what_helps(noisy, tmp_path):
+    from piazzi.formats import Arc, ocm_text
+
+    state = truth(T[:2])[1]
+    arc = Arc(
+        epoch=EPOCH + 1200.0, t=np.zeros(1), position=state[None, :3], velocity=state[None, 3:], centre="EARTH", frame="GCRF",
+        scale="UTC", covariance_t=np.zeros(1), covariance=np.diag([1e2] * 3 + [1e-4] * 3)[None], covariance_frames=("GCRF",),
+    )  # fmt: skip
+    (tmp_path / "x.ocm").write_text(ocm_text(arc))
+    with pytest.raises(
+        ValueError, match=r"x.ocm: it is of 2015-05-05T00:20:00 UTC.* at 2015-05-05T00:00:00 UTC.*--from 2015-05-05T00:20:00Z"
+    ):
+        pz.determine(observations(noisy, T, SIGMA), forces=KNOWN, prior=tmp_path / "x.ocm", from_=EPOCH)
+
+
 def test_sigmas_that_were_too_small_are_taken_larger(noisy):
     first = pz.determine(observations(noisy[HALF], T[HALF], SIGMA / 4), forces=KNOWN)
     then = pz.determine(observations(noisy, T, SIGMA), forces=KNOWN, prior=first)

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.approach import approached
 from piazzi.determination.case import Case
 from piazzi.determination.case_file import split
-from piazzi.determination.determining import analysis_at, answer_axes, observations_of, read, settled_axes, solved
+from piazzi.determination.determining import analysis_at, answer_axes, moving, observations_of, read, settled_axes, solved
 from piazzi.determination.faults import Faults
 from piazzi.determination.fit import estimators
 from piazzi.determination.initial_result import UndeterminedError
@@ -132,9 +131,8 @@ class Following:
         keep, reasons = np.ones(len(seen.tracking.values), dtype=np.bool_), np.full(len(seen.tracking.values), "", dtype=object)
         try:
             begin = guess or unguided(seen, lambda first: posed(seen, chosen(first), first))
-            given = setup(seen, chosen(begin), begin, earlier=earlier)
+            given = moving(setup(seen, chosen(begin), begin, earlier=earlier))
             if earlier is None:
-                given = approached(given)
                 self.announce("determining")
                 found = solved(given, {"graph": FactorGraph()}, case=replace(self.case, hold=None))
                 if not found.determined:

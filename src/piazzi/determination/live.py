@@ -11,7 +11,7 @@ import numpy as np
 
 from piazzi.determination.fit import kept
 from piazzi.determination.sensing import Measured
-from piazzi.determination.setup import Setup, at_last_used, follow, posed
+from piazzi.determination.setup import Setup, at_last_used, follow, renewed
 from piazzi.earth import Epoch
 from piazzi.estimate.estimator import Estimate
 from piazzi.orbit import state_axes
@@ -156,13 +156,7 @@ class Live:
 
     def _posed(self, seen: Measured) -> Problem:
         """The problem of other rows, with the prior, the noise and the constants that this one began with."""
-        base, given = self.given.problem, self.given
-        problem = posed(seen, given.chosen, given.guess)
-        own = {name: base.parameters[name] for name in base.model.constants if name in base.parameters}
-        return replace(
-            problem, prior=base.prior, prior_time=base.prior_time, manoeuvres=base.manoeuvres, process_noise=base.process_noise,
-            parameters={**problem.parameters, **own},
-        )  # fmt: skip
+        return renewed(self.given, seen, self.given.chosen).problem
 
     # ---- rows ----------------------------------------------------------------------------------------------------
 

@@ -97,6 +97,12 @@ def setup(
     assumed = [*guess.assumed, *measured.assumed, *chosen.assumed]
     before = None
     if earlier is not None:
+        if begin > float(times[0]):
+            raise ValueError(
+                f"--prior {earlier.source}: it is of {earlier.epoch}, after the first measurement that is new to it, at "
+                f"{measured.epoch + float(times[0])}: give an orbit of before, or leave out what is older, "
+                f"--from {_plain(earlier.epoch)}"
+            )
         assumed += earlier.assumed
         problem, before = _known(problem, earlier, begin, float(times[0]))
     start = np.concatenate([guess.state, problem.mean[6:]])
@@ -106,6 +112,11 @@ def setup(
         problem = replace(problem, prior=_prior(mean, chosen.extra), prior_time=begin)
     said = tuple(dict.fromkeys(assumed))
     return Setup(measured, chosen, guess, problem, tracking, rows, states, solution, said, earlier, before)
+
+
+def _plain(epoch: Epoch) -> str:
+    """A date as options take it."""
+    return f"{str(epoch).removesuffix(' UTC')}Z" if str(epoch).endswith(" UTC") else f"'{epoch}'"
 
 
 def at_last_used(given: Setup, keep: Array) -> Setup:
