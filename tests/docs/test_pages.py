@@ -48,6 +48,15 @@ def test_every_page_of_the_gallery_has_its_picture_its_notebook_and_a_place_in_t
         assert f"(gallery/{page.stem}.md)" in index and f"\ngallery/{page.stem}\n" in index
 
 
+def test_every_page_says_first_what_it_is_for():
+    for page in [
+        *DOCS.glob("*.md"),
+        *(p for folder in ("gallery", "how-to", "tutorials") for p in (DOCS / folder).glob("*.md")),
+    ]:
+        title, first = page.read_text(encoding="utf-8").split("\n\n")[:2]
+        assert title.startswith("# ") and not first.startswith(("```", "|", "- ")) and len(first.split()) >= 15, page.name
+
+
 def test_what_contributors_follow_is_run():
     table = re.findall(r"^\| an? .*\]\(([^)]+\.md)\)", (DOCS.parent / "CONTRIBUTING.md").read_text(), re.MULTILINE)
     assert len(table) == 6 and {DOCS.parent / page for page in table} <= set(PAGES)
