@@ -46,3 +46,28 @@ def test_a_row_takes_two_hundred_bytes_at_most(million):
     finally:
         tracemalloc.stop()
     assert peak / len(rows) < 200
+
+
+@pytest.mark.slow
+def test_a_million_laser_ranges(tmp_path, data_dir):
+    """The header of a real pass, and its first range a million times, a millisecond apart."""
+    lines = (data_dir / "earth/lageos2/lageos2_20160214.npt").read_text().splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("11 "))
+    first = lines[at].split()
+    start = float(first[1])
+    rows = [" ".join(["11", f"{start + 1e-3 * i:.12f}", *first[2:]]) for i in range(LINES)]
+    path = tmp_path / "a.npt"
+    path.write_text("\n".join([*lines[:at], *rows, "H8", "H9"]) + "\n")
+    del rows
+    pz.read_tracking(data_dir / "earth/lageos2/lageos2_20160214.npt")
+    started = time.process_time()
+    found = pz.read_tracking(path)
+    assert time.process_time() - started < 3.0
+    assert len(found) == LINES and found.t[-1] - found.t[0] == pytest.approx(1e-3 * (LINES - 1), abs=1e-9)
+    del found
+    tracemalloc.start()
+    try:
+        pz.read_tracking(path)
+        assert tracemalloc.get_traced_memory()[1] < 200 * LINES
+    finally:
+        tracemalloc.stop()

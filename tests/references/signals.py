@@ -45,11 +45,11 @@ def problem(*given, station=YARRAGADEE, x=None, parameters=None, numbers=None, f
 class Trajectory:
     """An orbit at any time near T, by small Runge-Kutta steps of the equations of motion."""
 
-    def __init__(self, p, x, t=T):
-        self.f, self.x, self.t = p.dynamics, np.array(x), t
+    def __init__(self, p, x, t=T, step=5.0):
+        self.f, self.x, self.t, self.step = p.dynamics, np.array(x), t, step
 
     def __call__(self, t):
-        steps = max(int(np.ceil(abs(t - self.t) / 5.0)), 1)
+        steps = max(int(np.ceil(abs(t - self.t) / self.step)), 1)
         h, x = (t - self.t) / steps, self.x
         for k in range(steps):
             at = self.t + k * h
