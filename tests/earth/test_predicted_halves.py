@@ -26,7 +26,7 @@ NOTHING = 1e-20  # a sigma that holds an acceleration at zero
 
 
 def fitted(data_dir, satellite, sigmas, part=0.5):
-    """What a part of the arc gives: how far it is off and by what covariance, with the rows that were seen, and the estimate."""
+    """How far a part of the arc is off, by which covariance, how many rows were seen, and the estimate."""
     arc = pz.read_ephemeris(data_dir / "earth" / "sp3" / "gps_g01_g05_20150505.sp3").of(satellite)[0]
     t, at = arc.t[::6], [arc.epoch + s for s in arc.t[::6]]
     place = earth.transform(arc.position[::6], None, "ITRF", "GCRF", at)[0]
