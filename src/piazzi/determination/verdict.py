@@ -259,7 +259,11 @@ def agreed(given: Setup, name: str, estimates: Mapping[str, Estimate]) -> Senten
 
 
 def apart_by(answer: Estimate, other: Estimate, k: int) -> float:
-    """The largest difference of a state at an epoch, in sigma of the answer, or of the other where it is in real time."""
+    """The largest difference of a state at an epoch, in sigma of the answer; of one in real time at the end, in its own.
+
+    What an estimator in real time says before that is made of other measurements.
+    """
+    k = k if other.view == "delayed" else len(other.times) - 1
     covariance = (answer if other.view == "delayed" else other).covariance[k]
     with np.errstate(all="ignore"):
         sigma = np.sqrt(np.maximum(np.diag(covariance)[:6], 0.0))
