@@ -388,3 +388,14 @@ def test_right_ascension_grows_to_the_left_as_on_the_sky(open_page, tmp_path, cl
         for mark in page.locator(".grid-lines text[text-anchor=middle]").all()
     ]
     assert [value for _, value in sorted(marks)] == sorted((value for _, value in marks), reverse=True)
+
+
+def test_stations_stand_on_the_picture_of_the_orbit(open_page, report):
+    """Above every line, to scale: the probe's radar is at the edge of the planet, ten metres from its middle."""
+    page = open_page(report)
+    orbit = page.locator("#t0 figure", has_text="Orbit").first
+    x = float(orbit.locator("path.site").get_attribute("d").split()[0][1:])
+    planet = orbit.locator("circle.planet")
+    assert x - float(planet.get_attribute("cx")) == pytest.approx(float(planet.get_attribute("r")), abs=0.1)
+    assert orbit.locator("svg > g").evaluate_all("all => all.findIndex(g => g.querySelector('.site'))") == 3
+    assert orbit.get_by_text("radar", exact=True).count() == 1

@@ -120,13 +120,18 @@ def _overlay(ax: Axes, comparison: Comparison, group: str, lengths: Sequence[Arr
     time, part, names = time_axis(ax, times, _epoch(comparison)), drawn(len(times)), tuple(name for name, _ in views)
     for n, ((name, view), length) in enumerate(zip(views, lengths, strict=True)):
         if length is not None:
-            style = line_of(name, view, names) | {"lw": 2.2 - 1.2 * n / len(views)}  # where two coincide, both are seen
+            style = line_of(name, view, names) | {"lw": _width(n, len(views))}
             ax.plot(times[part] * time.factor, length[part] * show.factor, **style, label=label_of(name, view))
     if any(v is not None and (v > 0).any() for v in lengths):
         ax.set_yscale("log")
         plain_ticks(ax)
     ax.set_ylabel(show.label(f"{plain(group)} {what}"))
     return ax
+
+
+def _width(n: int, count: int) -> float:
+    """Of the n-th of so many lines: where two coincide, both are seen."""
+    return 2.2 - 1.2 * n / count
 
 
 def _lengths(comparison: Comparison, group: str) -> list[tuple[Array | None, Array]]:
@@ -167,8 +172,9 @@ def _track(ax: Axes, comparison: Comparison, found: Squares) -> Axes:
     ax.axhline(found.expected, color=MEASURED, lw=0.9, ls=(0, (5, 3)), label="ideal mean")
     part, names = drawn(len(found.times)), tuple(name for name, _ in comparison.views)
     seen = [np.array([found.low, found.high])]
-    for (name, view), values in zip(comparison.views, found.values, strict=True):
-        ax.plot(found.times[part] * time.factor, values[part], **line_of(name, view, names), lw=1.0, label=label_of(name, view))
+    for n, ((name, view), values) in enumerate(zip(comparison.views, found.values, strict=True)):
+        style = line_of(name, view, names) | {"lw": _width(n, len(names))}
+        ax.plot(found.times[part] * time.factor, values[part], **style, label=label_of(name, view))
         seen.append(values[np.isfinite(values) & (values > 0)])
     ax.set_yscale("log")
     everything = np.concatenate(seen)

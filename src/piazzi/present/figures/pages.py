@@ -202,7 +202,7 @@ def consistency_page(comparison: Comparison) -> Figure:
     nis_track(axes[-1], comparison)
     axes[-1].set_title("Squared innovations in units of their covariance")
     figure.align_ylabels(list(axes))
-    figure.legend(*axes[-1].get_legend_handles_labels(), loc="outside lower center", ncols=5)
+    figure.legend(*axes[-1].get_legend_handles_labels(), loc="outside lower center", ncols=6)
     return figure
 
 

@@ -44,7 +44,8 @@ class Orbit {
     this.still = element("g", { "clip-path": `url(#${id})` });
     this.moving = element("g", { "clip-path": `url(#${id})` });
     this.empty = element("text", { x: this.middle[0], y: this.middle[1], "text-anchor": "middle", class: "empty" });
-    svg.append(this.grid, this.still, this.moving, this.empty);
+    this.sites = element("g", { "clip-path": `url(#${id})` });
+    svg.append(this.grid, this.still, this.moving, this.sites, this.empty);
     this.box.replaceChildren(svg);
     this.svg = svg;
     this.tracks.forEach((track) => this.prepare(track));
@@ -89,7 +90,7 @@ class Orbit {
       });
       track.whole.setAttribute("d", joined(track.points, this.breaks));
     }
-    for (const site of this.spec.sites) this.still.append(this.site(site));
+    for (const site of this.spec.sites) this.sites.append(this.site(site));
     this.axes();
   }
 
