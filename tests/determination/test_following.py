@@ -119,3 +119,21 @@ def test_stations_and_kinds_that_come_later_are_taken_up(pointed):
     assert {one["station"] for one in found.to_dict()["residuals"]} == set(SITES)
     chi = [value for row in taken[60:] for value in row.residuals.values()]
     assert 0.8 < np.mean(np.square(chi)) < 1.25
+
+
+@pytest.mark.slow
+def test_the_air_of_a_low_orbit_is_a_process_that_goes_on():
+    """A stream has no last row: where there is drag its density departs for ever, and what was predicted is judged by it."""
+    from tests.determination.fixing import observations
+
+    t = np.arange(0.0, 10800.0, 60.0)
+    r, v = np.array([6.7e6, 0.0, 1e5]), np.array([0.0, 1.0e3, 7.65e3])
+    fixes = observations(np.tile(r, (len(t), 1)), t, 5.0)
+    made = prepared(fixes, guess=Guess(EPOCH, r, v, "test"))
+    path = made.states[:, :3] + 5.0 * np.random.default_rng(0).standard_normal((len(t), 3))
+    live = pz.Following()
+    for rows in np.split(np.arange(3 * len(t)), 60):
+        live.take(observations(path, t, 5.0)[rows])
+    found = live.determination()
+    assert "cd_a_m_change" in found.problem.model.names and any("correlated over" in text for text in found.setup.assumed)
+    assert found.determined and found.verdict["honest"].ok is True and nees(found, made.states[-1, :6]) < 4.0

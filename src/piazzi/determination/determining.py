@@ -150,14 +150,9 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
 
 def ready(given: Setup) -> Setup:
     """The set-up near its answer, with the noise that it shows: of the air where drag matters, of passes that have some."""
-    return with_white_fixes(with_common_errors(moving(given)))
-
-
-def moving(given: Setup) -> Setup:
-    """The set-up near its answer, with the noise of the air where drag matters."""
     near = approached(given)
     found = with_density(near)
-    return near if found is near else refined(found)
+    return with_white_fixes(with_common_errors(near if found is near else refined(found)))
 
 
 def fitting_orbits(*tracking: Any, case: Case | None = None, **words: Any) -> InitialOrbits:

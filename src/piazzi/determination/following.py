@@ -9,21 +9,25 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination.approach import approached
 from piazzi.determination.case import Case
 from piazzi.determination.case_file import split
-from piazzi.determination.determining import analysis_at, answer_axes, moving, observations_of, read, settled_axes, solved
+from piazzi.determination.determining import analysis_at, answer_axes, observations_of, read, settled_axes, solved
 from piazzi.determination.faults import Faults
 from piazzi.determination.fit import estimators
+from piazzi.determination.guesses import Guess
 from piazzi.determination.initial_result import UndeterminedError
 from piazzi.determination.live import Live, Taken
+from piazzi.determination.orbit_forces import Chosen
 from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.determination.setup import Setup, posed, setup
 from piazzi.determination.sites import sites_of
 from piazzi.determination.unguided import unguided
-from piazzi.determination.unknowns import CLOCK, asked
+from piazzi.determination.unknowns import CLOCK, Estimated, asked, listed
 from piazzi.determination.verdict import verdict
 from piazzi.estimate.factor_graph import FactorGraph
+from piazzi.evaluate.consistency_tests import standardized
 from piazzi.formats import Observations, concatenate
 from piazzi.formats.streaming import Lines, is_mark, reader
 from piazzi.problem.checks import Array
@@ -131,7 +135,7 @@ class Following:
         keep, reasons = np.ones(len(seen.tracking.values), dtype=np.bool_), np.full(len(seen.tracking.values), "", dtype=object)
         try:
             begin = guess or unguided(seen, lambda first: posed(seen, chosen(first), first))
-            given = moving(setup(seen, chosen(begin), begin, earlier=earlier))
+            given = approached(setup(seen, self._with_air(rows, chosen, begin), begin, earlier=earlier))
             if earlier is None:
                 self.announce("determining")
                 found = solved(given, {"graph": FactorGraph()}, case=replace(self.case, hold=None))
@@ -145,6 +149,17 @@ class Following:
         self.waiting, self._given = "", given
         self._live = Live(given, self.estimator)
         return self._fed(given.measured, keep, reasons)
+
+    def _with_air(self, rows: Observations, chosen: Callable[[Guess], Chosen], begin: Guess) -> Chosen:
+        """The forces on an orbit, with the density of the air as a process where there is drag: a stream has no last row."""
+        found = chosen(begin)
+        air, said = found.air_varies, any(one.what.name == "cd" and one.what.is_process for one in self._unknowns)
+        if air is None or said:
+            return found
+        told = [*listed(self.case.estimate), Estimated("cd", f"~{air.time:.0f}s", air.sigma)]
+        found = read([rows], replace(self.case, stations=self._sites, estimate=told))[1](begin)
+        text = f"density of the air departs by {air.sigma:.0%}, correlated over {air.time / 3600.0:.3g} h"
+        return replace(found, assumed=(*found.assumed, text))
 
     def _carried(self, rows: Observations) -> list[Taken]:
         """More rows, taken by the estimate in progress."""
@@ -192,6 +207,9 @@ class Following:
         seen = self._measured(concatenate(self._seen))
         given, estimate, keep, reasons = self._live.whole(seen, time.perf_counter() - self._began)
         analysis, centre = analysis_at(given, given.states), given.measured.centre
+        if analysis is not None and not given.problem.is_noise_free:  # no orbit is what all rows are of: what was predicted is
+            told = standardized(estimate.innovations, estimate.innovation_covariances)
+            analysis = replace(analysis, whitened=np.where(np.isnan(told), analysis.whitened, told))
         sentences = verdict(given, self.name, {self.name: estimate}, analysis, keep, Faults(reasons, ()), None)
         return Determination(
             given, self.name, {self.name: estimate}, keep, reasons, analysis, sentences, centre.scale,
