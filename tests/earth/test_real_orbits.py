@@ -107,3 +107,42 @@ def test_a_day_of_another_program(data_dir, degree, last, metres):
     there = earth.transform(end[:3], None, "GCRF", "EME2000", epoch + 86400.0)[0]
     miss = np.linalg.norm(there - np.array(last) * 1e3)
     assert miss < metres
+
+
+@pytest.mark.parametrize(
+    ("a", "last", "metres"),
+    [
+        (7000e3, [791.0288295053131, -6955.409986553813, -0.02614433515330551], 7.0),  # 15 times a day in the shadow
+        (24396e3, [-10269.72958057943, -22135.59895717367, 0.008121155161511498], 0.55),
+    ],
+)
+def test_sunlight_of_another_program_over_24_days(data_dir, a, last, metres):
+    """GMAT: two bodies, 300 kg, 16 m2, coefficient 1.8, 1367 W/m2; in steps over the edges the low orbit is 52 m off."""
+    epoch, gm = pz.Epoch("2000-01-01T00:00:00 TAI"), 398600.4415e9
+    field = replace(earth.read_gravity(data_dir / "earth" / "gravity" / "JGM3.gfc"), gm=gm, tide_system="tide_free")
+    forces = earth.Forces(field, 0, radiation="cannonball", empirical=("along",), shadow_edges=True)
+    start = np.array([a, 0.0, 0.0, 0.0, np.sqrt(gm / a), 0.0])
+    problem = pz.Problem(
+        forces.model(),
+        pz.Gaussian(np.concatenate(earth.transform(start[:3], start[3:], "EME2000", "GCRF", epoch)), [1.0] * 6),
+        parameters={**dict.fromkeys(forces.parameters, 0.0), "radiation_on": 1.0, "cr_a_m": 1.8 * 16 / 300 * 1367 / 1361},
+        integrator=pz.RungeKutta8(24 * 1440),
+        functions=forces.functions(epoch),
+        epoch=epoch,
+        prior_time=0.0,
+    )
+    end, _ = problem.step(problem.prior.mean, 24 * 86400.0, 0.0)
+    there = earth.transform(end[:3], None, "GCRF", "EME2000", epoch + 24 * 86400.0)[0]
+    assert np.linalg.norm(there - np.array(last) * 1e3) < metres
+
+
+def test_j2_alone_of_a_third_program():
+    """Monte: J2 about the mean pole of J2000, as text; about the true pole of the date, 8 arcseconds off, it is 115 m."""
+    gm, size = 398600.4328969392e9, 1.5 * 0.000484169325971 * np.sqrt(5.0) * 398600.4328969392e9 * 6378136.3**2
+    r, pull = "sqrt(x**2 + y**2 + z**2)", {"x": 1, "y": 1, "z": 3}
+    rates = {f"v{c}": f"-{gm!r}*{c}/r**3 - {float(size)!r}*{c}*({n} - 5*z**2/r**2)/r**5" for c, n in pull.items()}
+    model = pz.Model(["x", "y", "z", "vx", "vy", "vz"], {"x": "vx", "y": "vy", "z": "vz", **rates}, definitions={"r": r})
+    start = np.array([-2436.45, -2436.45, 6891.037, 5.088611, -5.088611, 0.0]) * 1e3
+    problem = pz.Problem(model, pz.Gaussian(start, [1.0] * 6), integrator=pz.RungeKutta8(1440), prior_time=0.0)
+    end, _ = problem.step(start, 86400.0, 0.0)
+    assert np.linalg.norm(end[:3] - np.array([-5751472.565170783, 4721183.256208691, 2046020.865167045])) < 20.0
