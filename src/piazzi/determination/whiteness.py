@@ -1,7 +1,8 @@
 """Fixes that are correlated: a receiver's filter, its clock and the orbits that it knows err alike over minutes.
 
 Rows that share an error know less together than as many that do not.  Where residuals of one row go with those of the next,
-only every second row is used, every fourth, and so on, until they do not.
+only every second row is used, every fourth, and so on, until they do not.  Where they go together however far apart, it is the
+forces that do not hold, which other rows do not mend: all are used.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ FEWEST = 24  # fixes that are left at the least
 
 
 def with_white_fixes(given: Setup) -> Setup:
-    """The set-up with those fixes set aside that say what their neighbours say; itself where residuals are white."""
+    """The set-up with those fixes set aside that say what their neighbours say; itself where residuals are white, or never are."""
     wide = [s.sensor.startswith("position") for s in given.problem.stations]
     own = np.flatnonzero(np.array(wide)[given.tracking.stations_of(given.problem)])
     if len(own) < 2 * FEWEST or not np.isfinite(given.states).all():
@@ -30,14 +31,13 @@ def with_white_fixes(given: Setup) -> Setup:
     stride = 1
     while len(own) // (2 * stride) >= FEWEST and _goes_on(whitened[::stride]):
         stride *= 2
-    if stride == 1:
+    if stride == 1 or _goes_on(whitened[::stride]):
         return given
     spare = np.zeros(len(given.rows), dtype=np.bool_)
     spare[own] = True
     spare[own[::stride]] = False
     apart = float(np.median(np.diff(given.tracking.row_times[own[::stride]])))
-    text = f"fixes are correlated: one in {stride} is used, {number(apart / 60.0, 2)} min apart"
-    text += " and correlated still" if _goes_on(whitened[::stride]) else ", which are not"
+    text = f"fixes are correlated: one in {stride} is used, {number(apart / 60.0, 2)} min apart, which are not"
     return replace(given, spare=spare, assumed=(*given.assumed, text))
 
 
