@@ -22,7 +22,7 @@ FEWEST = 24  # fixes that are left at the least
 
 
 def with_white_fixes(given: Setup) -> Setup:
-    """The set-up with those fixes set aside that say what their neighbours say; itself where residuals are white, or never are."""
+    """The set-up with those fixes set aside that say what others say; itself where residuals are white, or never are."""
     wide = [s.sensor.startswith("position") for s in given.problem.stations]
     own = np.flatnonzero(np.array(wide)[given.tracking.stations_of(given.problem)])
     if len(own) < 2 * FEWEST or not np.isfinite(given.states).all():
