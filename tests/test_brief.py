@@ -8,10 +8,9 @@ import pytest
 
 import piazzi as pz
 from piazzi import earth, formats, orbit
-from piazzi.text import brief
+from piazzi.text import brief, spelled
 
 MOST = 500
-IN_CODE = {"Model", "Sensor", "Instrument"}  # their text is what kernels are named by
 SETTINGS = {
     "Bank", "Cauchy", "Coordinates", "EOP", "Eccentricity", "Equinoctial", "Estimated", "Forces", "Huber", "Keplerian",
     "LaserSphere", "ModifiedEquinoctial", "Parameter", "Region", "Transfer", "Tukey", "Weather",
@@ -43,7 +42,7 @@ def test_all_others_are_settings():
     """Words and numbers that somebody typed, shown whole, as they are typed."""
     whole = {name for name, cls in PUBLIC.items() if hasattr(cls.__repr__, "__wrapped__")}
     typed = {name for name in whole if issubclass(PUBLIC[name], pz.Integrator) or hasattr(PUBLIC[name], "estimate")}
-    assert whole - typed - IN_CODE == SETTINGS
+    assert whole - typed == SETTINGS
 
 
 def test_what_is_said_is_what_differs_from_the_defaults():
@@ -59,3 +58,25 @@ def test_files_that_were_read_are_short(tmp_path):
     rows = pz.read_tracking(pz.determination.case_file.CASES / "ceres-1801.txt", sigma="5arcsec")
     assert repr(rows).startswith("<Observations: 40 rows, right_ascension, declination by Palermo")
     assert len(repr(rows.segments[0])) <= MOST and len(repr(rows)) <= MOST
+
+
+def test_what_kernels_are_named_by_is_spelled_in_full():
+    """A name that left anything out would give one model the code of another."""
+    model = pz.load("leo-radar")[0].model
+    text = spelled(model)
+    assert len(repr(model)) <= MOST and all(len(repr(sensor)) <= MOST for sensor in model.sensors)
+    for words in (*model.dynamics, *(equation for sensor in model.sensors for equation in sensor.equations)):
+        assert repr(words) in text
+    changed = dataclasses.replace(model, dynamics=(*model.dynamics[:5], model.dynamics[5] + " + 1e-9"))
+    assert repr(changed) == repr(model) and spelled(changed) != text
+
+
+def test_spelled_is_what_generated_texts_are():
+    @dataclasses.dataclass(frozen=True)
+    class Pair:
+        a: object
+        b: object
+        c: int = dataclasses.field(default=1, repr=False)
+
+    for value in (Pair(1, "x"), Pair((Pair(1.5, None),), [Pair("y", (1,)), ()]), (1, Pair({"k": 2}, True))):
+        assert spelled(value) == repr(value).replace(Pair.__qualname__, "Pair").replace("Pair", Pair.__qualname__)

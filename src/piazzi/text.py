@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, is_dataclass
 from typing import Any
 
 LONGEST = 500
@@ -113,3 +113,14 @@ def _brief(value: Any) -> str:
         )
     text = repr(value)
     return text if len(text) <= 80 else f"<{type(value).__name__}>"
+
+
+def spelled(value: Any) -> str:
+    """A value in full, field by field: what keys and digests are made of, whatever `repr` shows."""
+    if is_dataclass(value) and not isinstance(value, type):
+        own = ", ".join(f"{field.name}={spelled(getattr(value, field.name))}" for field in fields(value) if field.repr)
+        return f"{type(value).__qualname__}({own})"
+    if type(value) in (tuple, list):
+        inner = ", ".join(map(spelled, value)) + "," * (type(value) is tuple and len(value) == 1)
+        return f"({inner})" if type(value) is tuple else f"[{inner}]"
+    return repr(value)

@@ -13,6 +13,7 @@ from piazzi.io.archive import read_arrays
 from piazzi.io.npz import write_arrays
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.text import spelled
 
 MARK = "piazzi_checkpoint"
 _COUNTS, _DIGESTS = ("lines", "written"), ("consumed", "opening")
@@ -27,7 +28,9 @@ def fingerprint(problem: Problem, estimator: object) -> Array:
     numbers = b"".join(np.ascontiguousarray(a).tobytes() for a in (*arrays, problem.station_numbers))
     noise = problem.process_noise
     kind = (noise.per, noise.method, noise.axes)
-    words = repr((problem.model, problem.integrator, problem.prior_time, [s.name for s in problem.stations], kind, estimator))
+    words = spelled(
+        (problem.model, problem.integrator, problem.prior_time, [s.name for s in problem.stations], kind, estimator)
+    )
     if problem.epoch is not None:  # those without one keep the digest that they had
         words += problem.epoch.exact()
     words += "".join(f"{name} {checksum}" for name, checksum in problem.checksums.items())

@@ -19,6 +19,7 @@ from piazzi.kernels.runge_kutta import RungeKutta4
 from piazzi.kernels.sizes import ROWS, sizes_source
 from piazzi.model import Model
 from piazzi.model.pruning import motion_of, sensors_of
+from piazzi.text import spelled
 
 HERE = Path(__file__).parent
 FILLS_REGISTERS = 8
@@ -67,7 +68,7 @@ class KernelSpec:
         """Hash of everything that the compiled module depends on, this machine and the generator's own text included."""
         if self.apart is None:
             numbers = [self.model.numbers(sensor) for sensor in self.model.sensors]  # those of rules of visibility among them
-            what, fragments = repr((self.model, self.scheme, self.lanes, numbers, self.unit)), self.fragments
+            what, fragments = spelled((self.model, self.scheme, self.lanes, numbers, self.unit)), self.fragments
         else:
             what, fragments = self._algebra(self.lanes), self.apart.own(self.fragments)
         own = [(name, _fragment(name)) for name in fragments]

@@ -12,7 +12,7 @@ from piazzi.model.definitions import STEP, TIME, Definition, Hoist, definitions_
 from piazzi.model.events import check_events, events_of
 from piazzi.model.functions import AT, ROOT, STATION, Signature, signature_of
 from piazzi.model.sensor import Parameter, Sensor, as_tuple
-from piazzi.text import nearest, suggest
+from piazzi.text import listed, nearest, suggest
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,12 @@ class Model:
             roots: Mapping[str, Mapping[str, Any]] | Sequence[Any] = (),
             events: Mapping[str, str] | Sequence[Any] = (),
         ) -> None: ...
+
+    def __repr__(self) -> str:
+        """In short; `show` prints the equations."""
+        seen = f", seen by {listed(sensor.name for sensor in self.sensors)}" if self.sensors else ""
+        given = f", with {listed(self.parameter_names)}" if self.parameters else ""
+        return f"<Model: {listed(self.states, 8)}{seen}{given}>"
 
     def __post_init__(self) -> None:
         put = object.__setattr__

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from piazzi.model.definitions import Hoist, definitions_of, in_order, name_of, needed, unused
 from piazzi.model.functions import STATION, STATION_TABLE
+from piazzi.text import brief
 
 Role = Literal["fixed", "estimated", "considered"]
 
@@ -97,6 +98,8 @@ class Sensor:
             roots: Mapping[str, Mapping[str, Any]] | Sequence[Any] = (),
             on_sky: Mapping[str, str] | Sequence[tuple[str, str]] = (),
         ) -> None: ...
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         put = object.__setattr__

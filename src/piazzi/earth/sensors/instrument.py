@@ -17,7 +17,7 @@ from piazzi.earth.tabulated import Place
 from piazzi.earth.weather import Weather
 from piazzi.model import Sensor
 from piazzi.model.functions import STATION_TABLE
-from piazzi.text import nearest
+from piazzi.text import brief, nearest
 
 MAPPINGS = ("ah", "bh", "ch", "aw", "bw", "cw")
 
@@ -44,6 +44,8 @@ class Instrument(Sensor):
     if TYPE_CHECKING:
 
         def __init__(self, *given: Any, **named: Any) -> None: ...
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         super().__post_init__()
