@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from piazzi.orbit import propagate_kepler
 from piazzi.orbit.fits import Rows, Setting, fitted, squares
-from piazzi.orbit.modes import thinned, two_body_modes
+from piazzi.orbit.modes import density, thinned, two_body_modes
 from piazzi.orbit.starts import Region, halton
 from tests.references.tracks import ABOUT_EARTH, EARTH, RADIUS, TRACKS, solved, track
 
@@ -28,6 +28,25 @@ def test_the_truth_is_among_the_modes_of_many(kind):
     assert sum(k is None for _, k, _ in found) <= 1
     off = [s[k] for _, k, s in found if k is not None]
     assert 4.0 < np.median(off) < 9.0
+
+
+def test_the_density_before_measurements_is_uniform_in_what_is_measured_and_in_the_logarithm_of_the_distance():
+    """The determinant of the change of variables, by central differences."""
+    here, moves = np.array([1.0, 0.2, -0.3]), np.array([0.1, 0.9, 0.2])
+
+    def state(y):
+        lon, lat, dlon, dlat, size, rate = y
+        rho = np.exp(size)
+        u = np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+        east, north = np.array([-np.sin(lon), np.cos(lon), 0.0]), np.cross(u, [-np.sin(lon), np.cos(lon), 0.0])
+        return np.concatenate([here + rho * u, moves + rate * u + rho * (dlon * east + dlat * north)])
+
+    found = []
+    for size in (0.3, 1.1):
+        y = np.array([0.4, 0.0, 0.2, -0.1, size, 0.3])  # at the equator of the sky, where angles are lengths
+        J = np.stack([(state(y + e) - state(y - e)) / 2e-5 for e in 1e-5 * np.eye(6)], axis=1)
+        found.append(np.linalg.slogdet(J)[1] + density(10.0 * state(y)[None], 10.0 * here)[0])
+    assert_allclose(found[0], found[1], atol=1e-8)
 
 
 def test_derivatives_are_those_of_differences():

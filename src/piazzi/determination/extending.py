@@ -15,12 +15,13 @@ from piazzi.determination.beliefs import carried_to
 from piazzi.determination.centres import Centre
 from piazzi.determination.initial_result import Beyond, OrbitMode
 from piazzi.determination.orbit_forces import STEPS
+from piazzi.determination.sights import observers
 from piazzi.earth import Epoch
 from piazzi.estimate.batch import BatchLeastSquares, undisturbed
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.information import along
 from piazzi.orbit import propagate_kepler
-from piazzi.orbit.modes import SAME, Mode
+from piazzi.orbit.modes import SAME, Mode, density
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import prepare
@@ -58,9 +59,9 @@ def refined(
     times = tracking.row_times
     low, high = ends
     keep = (times >= low) & (times <= high)
-    moved = (propagate_kepler(m.state[:3], m.state[3:], centre.mu, float(times[keep].min()) - at) for m in modes)
-    starts = [np.concatenate([r, v, problem.mean[6:]]) for r, v in moved]
-    found = _different(_fits(problem, tracking, keep, starts))
+    begun = (propagate_kepler(m.state[:3], m.state[3:], centre.mu, float(times[keep].min()) - at) for m in modes)
+    starts = [np.concatenate([r, v, problem.mean[6:]]) for r, v in begun]
+    found = _different(_fits(problem, tracking, keep, starts), observer(problem, tracking, keep))
     beyond = None
     while found and not keep.all():
         reach = KNOWN / drift(found[0], centre.mu)
@@ -70,7 +71,8 @@ def refined(
             break
         low, high = more
         wider = (times >= low) & (times <= high)
-        again = _different(_fits(problem, tracking, wider, _carried(problem, found, float(times[wider].min()), centre), False))
+        moved = _carried(problem, found, float(times[wider].min()), centre)
+        again = _different(_fits(problem, tracking, wider, moved, False), observer(problem, tracking, wider))
         if not again:
             beyond = _beyond(problem, times, keep, 0.0)
             break
@@ -82,6 +84,15 @@ def part(tracking: Tracking, keep: Array) -> Tracking:
     """The rows to keep (J,) alone."""
     who = tracking.row_stations
     return Tracking(tracking.row_times[keep], tracking.values[keep], None if who is None else who[keep], epoch=tracking.epoch)
+
+
+def observer(problem: Problem, tracking: Tracking, keep: Array) -> Array:
+    """Where the earliest row to keep was measured from, (3,); the centre where its station has no place."""
+    first = int(np.flatnonzero(keep)[np.argmin(tracking.row_times[keep])])
+    station = problem.stations[int(tracking.stations_of(problem)[first])]
+    if station.place is None:
+        return np.zeros(3)
+    return np.asarray(observers(problem.epoch, station, tracking.row_times[first : first + 1])[0][0])
 
 
 def drift(one: Refined, mu: float) -> float:
@@ -156,21 +167,22 @@ def _square(problem: Problem, tracking: Tracking, estimate: Estimate) -> tuple[f
     return float(np.sum(left[there] ** 2)), int(there.sum())
 
 
-def _different(found: Iterator[Refined]) -> list[Refined]:
+def _different(found: Iterator[Refined], here: Array) -> list[Refined]:
     """Those that are not the same as a better one, the best first; improbable ones left out."""
     kept: list[Refined] = []
     for one in sorted(found, key=lambda f: f.square):
         if all(_apart_in_sigmas(one, other) > SAME for other in kept):
             kept.append(one)
-    return [one for one, share in zip(kept, shares(kept), strict=True) if share > LEAST]
+    return [one for one, share in zip(kept, shares(kept, here), strict=True) if share > LEAST]
 
 
-def shares(found: Sequence[Refined]) -> list[float]:
-    """Probabilities of fits to the same rows, the best first."""
+def shares(found: Sequence[Refined], here: Array) -> list[float]:
+    """Probabilities of fits to the same rows, the best first, of which the earliest was measured from `here`."""
     if not found:
         return []
     scale = max(found[0].square / max(found[0].count - 6, 1), 1.0)  # forces that are left out make all of them worse
     score = np.array([-0.5 * f.square / scale + 0.5 * np.linalg.slogdet(f.covariance)[1] for f in found])
+    score += density(np.array([f.state for f in found]), here)
     weight = np.exp(score - score.max())
     return list((weight / weight.sum()).tolist())
 
@@ -180,9 +192,9 @@ def _apart_in_sigmas(one: Refined, other: Refined) -> float:
     return float(np.sum(np.linalg.solve(root, one.state - other.state) ** 2))
 
 
-def weighed(found: Sequence[Refined]) -> tuple[OrbitMode, ...]:
-    """Fits with their probabilities, the most probable first."""
-    ordered = sorted(zip(shares(found), found, strict=True), key=lambda pair: -pair[0])
+def weighed(found: Sequence[Refined], here: Array) -> tuple[OrbitMode, ...]:
+    """Fits with their probabilities, the most probable first; `here` is where the earliest row was measured from."""
+    ordered = sorted(zip(shares(found, here), found, strict=True), key=lambda pair: -pair[0])
     return tuple(
         OrbitMode(f.epoch, f.state, f.covariance, p, float(np.sqrt(f.square / max(f.count, 1))), f.count) for p, f in ordered
     )

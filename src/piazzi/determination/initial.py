@@ -9,7 +9,7 @@ import numpy as np
 
 from piazzi.determination.beliefs import carried_to
 from piazzi.determination.centres import Centre, centre_of
-from piazzi.determination.extending import LONGER, part, refined, weighed
+from piazzi.determination.extending import LONGER, observer, part, refined, weighed
 from piazzi.determination.initial_result import InitialOrbits, OrbitMode, Parting, UndeterminedError
 from piazzi.determination.orbit_forces import STEPS
 from piazzi.determination.ridge import OPEN, openness, ridge
@@ -62,7 +62,8 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None =
     if wide > OPEN and ((tracking.row_times[keep] <= ends[1]) & (tracking.row_times[keep] >= ends[0])).all():
         what = ridge(rows.of(first), region, problem.epoch, known)
         return InitialOrbits((), search.starts, search.fits, None, centre.name, what, beyond)
-    modes = weighed(found) or tuple(_unrefined(problem, search, inside[:MOST], len(np.unique(index[first]))))
+    modes = weighed(found, observer(problem, tracking, keep))
+    modes = modes or tuple(_unrefined(problem, search, inside[:MOST], len(np.unique(index[first]))))
     modes = tuple(replace(mode, why_not=_why_not(mode.mean, region, centre)) for mode in modes)
     apart = _apart(problem, tracking, modes, centre) if len(modes) > 1 else None
     return InitialOrbits(modes, search.starts, search.fits, apart, centre.name, None, beyond)

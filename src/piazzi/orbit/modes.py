@@ -82,7 +82,9 @@ def two_body_modes(
     best = _distinct(found, 40)
     ends = np.hstack([found.state[best], found.offset[best, None]])
     found = fitted(thinned(rows, 200), ends, replace(setting, steps=LONG))
-    return Search(epoch, _weighed(found, region, offset_sigma), len(drawn), len(found.square))
+    nearest = int(np.argmin(np.abs(rows.t - epoch)))
+    weighed = _weighed(found, region, offset_sigma, rows.observer[nearest])
+    return Search(epoch, weighed, len(drawn), len(found.square))
 
 
 def thinned(rows: Rows, most: int) -> Rows:
@@ -132,7 +134,17 @@ def _distinct(found: Fits, most: int) -> list[int]:
     return kept
 
 
-def _weighed(found: Fits, region: Region, offset_sigma: float) -> tuple[Mode, ...]:
+def density(state: Array, observer: Array) -> Array:
+    """Logarithm of the density of states (K, 6) before the measurements, up to a constant.
+
+    Directions and their rates are uniform, and so are the rate of the distance and the logarithm of the distance (which has no
+    unit that it prefers): of d^3r d^3v this is distance^-5.  A density that is uniform in states would call what is far away,
+    and fast, more probable than what is near.
+    """
+    return np.asarray(-5.0 * np.log(np.maximum(np.linalg.norm(state[:, :3] - observer, axis=1), 1.0)))
+
+
+def _weighed(found: Fits, region: Region, offset_sigma: float, observer: Array) -> tuple[Mode, ...]:
     """Modes with their evidence; those far below the best are none."""
     kept = _distinct(found, len(found.square))
     if not kept:
@@ -140,7 +152,7 @@ def _weighed(found: Fits, region: Region, offset_sigma: float) -> tuple[Mode, ..
     used = slice(7 if offset_sigma > 0 else 6)
     least = 1e-300  # of rows that leave a direction open, where the evidence has no bound
     volume = np.array([np.log(np.maximum(np.abs(np.diag(found.root[k])[used]), least)).sum() for k in kept])
-    score = -0.5 * found.square[kept] - volume
+    score = -0.5 * found.square[kept] - volume + density(found.state[kept], observer)
     inside = region.holds(found.state[kept])
     top = score[inside].max() if inside.any() else score.max()
     weight = np.where(inside, np.exp(np.minimum(score - top, 0.0)), 0.0)
