@@ -1,6 +1,7 @@
 """Rows that are held back: how they are named, how they are predicted, and what the verdict says of it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from piazzi.determination.case import Case
 from piazzi.determination.determining import prepared, solved
 from piazzi.determination.fit import estimate, estimators
 from piazzi.determination.holding import check, held, passes
+from piazzi.determination.instruments import pass_of_rows
 from piazzi.determination.verdict import Sentence, unseen
 from piazzi.evaluate.information import predicted
 from piazzi.formats import Observations, Segment
@@ -62,6 +64,14 @@ def noisy(given, seed, factor=1.0):
     return with_values(
         given, given.tracking.values + factor * SIGMA * np.random.default_rng(seed).standard_normal(given.tracking.values.shape)
     )
+
+
+def test_revolutions_that_follow_each_other_are_two_passes_of_a_station():
+    """A satellite at 500 km comes again after 94.6 minutes and is seen for ten: 85 minutes are no gap within a pass."""
+    revolution = 2.0 * np.pi * np.sqrt(6878137.0**3 / 3.986004418e14)
+    t = np.concatenate([np.arange(0.0, 600.0, 60.0), revolution + np.arange(0.0, 600.0, 60.0)])
+    tracking = pz.Tracking(t, np.zeros((20, 1)), np.array(["s1"] * 20), epoch=EPOCH)
+    assert pass_of_rows(SimpleNamespace(labels={"s1": "7090"}), tracking).tolist() == [1] * 10 + [2] * 10
 
 
 def test_passes_are_parted_by_gaps_and_by_blocks_that_follow_each_other(given):

@@ -15,7 +15,7 @@ from piazzi.formats import TAGS, Segment
 from piazzi.problem.checks import Array
 
 EVENTS = {"transmit": "transmission", "bounce": "bounce", "receive": "reception"}
-GAP = 7200.0  # s between rows of a station, from which on they are of another pass
+GAP = 3600.0  # s without a row, behind which another pass begins: a low satellite comes again after 75 min or more
 
 
 class Way(NamedTuple):
