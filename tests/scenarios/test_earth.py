@@ -228,10 +228,11 @@ def test_studies_vary_the_true_degree(tmp_path):
         pz.Study(problem, [0.0, 60.0], ["ekf"], vary={"truth.earth.degree": [500]})
 
 
-def test_a_problem_with_forces_is_kept_bit_for_bit(tmp_path):
+@pytest.mark.parametrize("eop", ["{ ut1_utc = 0.1 }", '"subdaily"', "{ ut1_utc = 0.1, subdaily = true }"])
+def test_a_problem_with_forces_is_kept_bit_for_bit(tmp_path, eop):
     problem = load(
         tmp_path,
-        'drag = "exponential"\neop = { ut1_utc = 0.1 }',
+        f'drag = "exponential"\neop = {eop}',
         "cd_a_m = 0.01",
         '[truth.earth]\ndegree = 10\nbodies = ["sun"]\n[truth.parameters]\ncd_a_m = 0.02',
     )

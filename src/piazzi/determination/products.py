@@ -19,6 +19,7 @@ from piazzi.determination.document import document, solution
 from piazzi.determination.residuals import table
 from piazzi.earth import Epoch
 from piazzi.earth.eop import mjd_text, tables
+from piazzi.earth.subdaily import SubdailyEOP
 from piazzi.formats import MeanElements, ocm_text, oem_text, omm_text, opm_text
 from piazzi.formats.tle import tle_text
 from piazzi.io import hdf5
@@ -133,13 +134,16 @@ def comments(found: Any, formal: bool | None = None) -> Iterator[str]:
 
 def _age(last: Epoch, given: Any) -> str:
     """What the orientation of the Earth was taken from, and whether it was measured by then."""
-    eop = tables() if given is None else given
+    within = isinstance(given, SubdailyEOP)
+    added = ", with tides within the day" if within else ""
+    eop = given.daily if within else tables() if given is None else given
     if not np.isfinite(getattr(eop, "measured", np.nan)):
-        return "Earth orientation: constants, or a table that does not say what was measured."
+        return f"Earth orientation: constants, or a table that does not say what was measured{added}."
     day = mjd_text(eop.measured)
     ahead = last.reading("UTC").day - eop.measured
     state = f"predicted over the last {ahead:.0f} days" if ahead > 0 else "so at all of these dates"
-    return f"Earth orientation of {', '.join(Path(file).name for file in eop.source.split(', '))}: measured to {day}, {state}."
+    files = ", ".join(Path(file).name for file in eop.source.split(", "))
+    return f"Earth orientation of {files}: measured to {day}, {state}{added}."
 
 
 def with_comments(text: str, lines: Iterator[str] | Sequence[str]) -> str:

@@ -27,6 +27,7 @@ from piazzi.earth.stations import (
     azimuth_elevation_range,
     up_north_east,
 )
+from piazzi.earth.subdaily import SubdailyEOP
 from piazzi.earth.tabulated import Body, Place, Rotation
 from piazzi.earth.thermosphere import Thermosphere
 from piazzi.earth.tides import pole_tide, solid_tide, station_displacement
@@ -35,9 +36,9 @@ from piazzi.earth.weather import Weather
 __all__ = [
     "BODIES", "EOP", "FRAMES", "LASER_SPHERES", "Body", "Coordinates", "EOPTable", "EOPWarning", "Eccentricity",
     "EphemerisWarning", "Epoch", "ForceChoice", "Forces", "Formula", "Gravity", "GravityField", "LaserSphere", "Place",
-    "Rotation", "SpaceWeather", "SpaceWeatherWarning", "Station", "StationList", "StationWarning", "Thermosphere", "Weather",
-    "azimuth_elevation_range", "body", "coefficient_faults", "default_forces", "geodetic_to_position",
-    "gravity_field", "ilrs_stations", "laser_sphere", "media", "mpc_stations", "pole_tide",
+    "Rotation", "SpaceWeather", "SpaceWeatherWarning", "Station", "StationList", "StationWarning", "SubdailyEOP",
+    "Thermosphere", "Weather", "azimuth_elevation_range", "body", "coefficient_faults", "default_forces",
+    "geodetic_to_position", "gravity_field", "ilrs_stations", "laser_sphere", "media", "mpc_stations", "pole_tide",
     "position_to_geodetic", "read_eop", "read_forces", "read_gravity", "read_space_weather", "read_stations", "rotation",
     "rotation_rate", "sensors", "solid_tide", "station_displacement", "transform", "up_north_east", "use_data",
 ]  # fmt: skip

@@ -19,6 +19,7 @@ from piazzi.earth.finding import check_kernel, found
 from piazzi.earth.forces import Forces
 from piazzi.earth.scales import Orientation
 from piazzi.earth.space_weather import SpaceWeather, read_space_weather
+from piazzi.earth.subdaily import SubdailyEOP
 from piazzi.earth.thermosphere import Thermosphere
 from piazzi.earth.tides import RADIUS
 from piazzi.opening import opened
@@ -32,6 +33,7 @@ REFLECTED, DRAGGED = 0.013, 0.022  # m2/kg: coefficients 1.3 and 2.2 on 0.01 m2/
 NO = ("no", "none", "off", "false")
 YES = ("yes", "on", "true")
 LARGEST = 2**18  # bytes of a file of forces
+WITHIN_THE_DAY = "subdaily"  # of `eop`: tides of UT1 and of the pole, and libration
 DATA = ("eop", "kernel", "asteroid_kernel", "weather")  # keys beside the fields of Forces
 
 
@@ -94,6 +96,7 @@ class ForceChoice:
         words += [f"radiation ({f.radiation})"] if f.radiation else []
         words += [f"drag ({f.drag})"] if f.drag else []
         words += [f"constants along {', '.join(f.empirical)}"] if f.empirical else []
+        words += ["tides of UT1 and of the pole within the day"] if isinstance(self.eop, SubdailyEOP) else []
         return f"{', '.join(words)} ({self.source})"
 
 
@@ -230,20 +233,32 @@ def force_field(name: str, value: Any, folder: Path) -> Any:
 
 
 def read_data(name: str, value: Any, folder: Path) -> Any:
-    """Orientation of the Earth, from a file of the IERS or as a table of constants; space weather; or the path of a kernel."""
+    """Orientation of the Earth, from files of the IERS or as a table of constants; space weather; or the path of a kernel."""
     if name.endswith("kernel"):
         path = folder / str(value)
         check_kernel(path)
         return path
     if name == "weather":
         return read_space_weather(folder / str(value))
-    if isinstance(value, Mapping):
-        known = [f.name for f in fields(EOP)]
-        for key in value:
-            if key not in known:
-                raise ValueError(f"eop: {key[:60]!r} is not known{nearest(key[:60], known)}")
-        return EOP(**{key: _number(key, number) for key, number in value.items()})
-    return read_eop(folder / str(value))
+    return _orientation(value, folder)
+
+
+def _orientation(value: Any, folder: Path) -> Orientation:
+    """A file, `subdaily`, both as `subdaily:FILE`, or a table of constants with the switch `subdaily`."""
+    if not isinstance(value, Mapping):
+        word, both, file = str(value).strip().partition(":")
+        if word != WITHIN_THE_DAY:
+            return read_eop(folder / str(value))
+        return SubdailyEOP(read_eop(folder / file) if both else None)
+    known = [*(f.name for f in fields(EOP)), WITHIN_THE_DAY]
+    for key in value:
+        if key not in known:
+            raise ValueError(f"eop: {key[:60]!r} is not known{nearest(key[:60], known)}")
+    within = value.get(WITHIN_THE_DAY, False)
+    if not isinstance(within, bool):
+        raise ValueError(f"eop: {WITHIN_THE_DAY} is {within!r}; it must be true or false")
+    held = EOP(**{key: _number(key, number) for key, number in value.items() if key != WITHIN_THE_DAY})
+    return SubdailyEOP(held) if within else held
 
 
 def _number(name: str, value: Any) -> float:

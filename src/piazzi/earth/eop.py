@@ -1,8 +1,8 @@
 """How the Earth is turned: UT1 and the pole, day by day, from the files of the IERS, or held constant.
 
 Tables hold one value per day at 0h UTC.  Between them UT1 - TAI (which has no leap seconds), the pole and its offsets follow
-the polynomial through the four nearest days, as in Lagrange interpolation of degree 3; IERS Conventions 2010, 5.5.1.  The
-tides of UT1 and of the pole within the day are left out.
+the polynomial through the four nearest days, as in Lagrange interpolation of degree 3; IERS Conventions 2010, 5.5.1.  What
+moves both within the day is added by `subdaily`.
 """
 
 from __future__ import annotations

@@ -22,6 +22,7 @@ from piazzi.earth.epoch import Epoch, pairs
 from piazzi.earth.rotation import FRAMES, frame_named, rotation
 from piazzi.earth.scales import Orientation
 from piazzi.earth.stations import Station
+from piazzi.earth.subdaily import SubdailyEOP
 from piazzi.earth.tides import station_displacement
 from piazzi.model.functions import STATION_TERMS, Signature
 from piazzi.outside.evaluation import check_count, checksum, derivatives, value
@@ -296,5 +297,7 @@ def in_tdb(start: Epoch, epochs: list[Epoch]) -> list[Epoch]:
 
 def orientation_key(eop: Orientation | None) -> Iterable[Any]:
     """What tells one orientation of the Earth from another."""
+    if isinstance(eop, SubdailyEOP):
+        return ("subdaily", *orientation_key(eop.eop))
     daily = getattr(eop, "daily_ut1_tai", None)
     return (repr(eop),) if daily is None else (getattr(eop, "source", ""), daily.tobytes().hex())

@@ -78,8 +78,15 @@ def _written_field(function: Any) -> dict[str, Any]:
 
 def written_orientation(eop: Any) -> Any:
     """Constants, or the file that a table is from; raises ValueError for a table that is from none."""
+    from piazzi.earth.defaults import WITHIN_THE_DAY
     from piazzi.earth.eop import EOP
+    from piazzi.earth.subdaily import SubdailyEOP
 
+    if isinstance(eop, SubdailyEOP):
+        if eop.eop is None:
+            return WITHIN_THE_DAY
+        daily = written_orientation(eop.eop)
+        return f"{WITHIN_THE_DAY}:{daily}" if isinstance(daily, str) else daily | {WITHIN_THE_DAY: True}
     if isinstance(eop, EOP):
         return vars(eop)
     if not Path(eop.source).is_file():
