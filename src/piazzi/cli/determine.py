@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 @click.command(cls=WithCase)
 @click.argument("files", metavar="TRACKING...", nargs=-1, required=True)
 @case_options
-@results.title_option
 @conventions
 def command(files: tuple[str, ...], **given: Any) -> int:
     """Determine an orbit from TRACKING.
@@ -199,7 +198,7 @@ def _write(found: Determination, case: Case) -> list[str]:
         paths = found.figures(folder, case.format, case.width)
         wrote.append(f"Wrote {len(paths)} pictures into {folder}")
     if case.report is not None:
-        wrote.append(f"Wrote {found.report(case.report.replace('{object}', _file_name(found.object)), results.given_title())}")
+        wrote.append(f"Wrote {found.report(case.report.replace('{object}', _file_name(found.object)), case.title)}")
     return wrote
 
 

@@ -97,6 +97,7 @@ class Case:
     report: str | None = asked(
         None, "DIR", "Write report.html into DIR: one page that works offline; DIR may end in .html.", usual=True
     )
+    title: str | None = asked(None, "TEXT", "Title of the page.", read.text)
     figures: str | None = asked(None, "DIR", "Write pictures for papers into DIR.", read.text)
     format: str = asked("pdf", "NAMES", "Of the pictures: pdf,svg,png,pgf.  [default: pdf]", read.formats)
     width: str = asked("88mm", "LENGTH", "Of the pictures: 88mm, 3.5in.  [default: 88mm]", read.width)

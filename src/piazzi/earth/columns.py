@@ -10,6 +10,7 @@ import numpy as np
 from piazzi.earth import scales
 from piazzi.earth.dates import Reading, read_date
 from piazzi.earth.epoch import Epoch, orientation
+from piazzi.text import shown
 
 Array = np.ndarray[Any, Any]
 
@@ -65,7 +66,7 @@ def read_dates(texts: Array, scale: str | None = None, place: Callable[[int], st
     if other.size:
         i = int(other[0])
         here, before = known[kinds[i]], known[kinds[0]]
-        raise ValueError(f"{place(i)}date {_text(texts[i])!r} is in {here}, those before in {before}; one file has one scale")
+        raise ValueError(f"{place(i)}date {shown(_text(texts[i]))} is in {here}, those before in {before}; one file has one scale")
     kind = known[int(kinds[0])]
     return Instants(kind, *scales.to_tt(kind, day, seconds, fraction, orientation(kind)))
 
@@ -88,7 +89,7 @@ def _one(text: str, scale: str | None, place: str) -> Reading:
     try:
         reading = read_date(text, scale)
         if scale is not None and reading.scale != scale.upper():
-            raise ValueError(f"date {text!r} is in {reading.scale}, and {scale} was said beside it")
+            raise ValueError(f"date {shown(text)} is in {reading.scale}, and {scale} was said beside it")
     except ValueError as error:
         raise ValueError(f"{place}{error}") from None
     return reading

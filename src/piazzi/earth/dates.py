@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from piazzi.earth import scales
+from piazzi.text import shown
 
 _CALENDAR = r"(?P<year>\d{4})-(?:(?P<month>\d{1,2})-(?P<day>\d{1,2})|(?P<doy>\d{3}))"
 _CLOCK = r"(?:[T ](?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,](?P<fraction>\d+))?)?)?"
@@ -31,7 +32,7 @@ def scale_named(name: str, text: str) -> str:
     """The scale of that name in any case; raises ValueError with the scales that there are."""
     known = name.upper()
     if known not in scales.SCALES:
-        raise ValueError(f"date {text!r}: {name!r} is no time scale; there are {', '.join(scales.SCALES)}")
+        raise ValueError(f"date {shown(text)}: {name!r} is no time scale; there are {', '.join(scales.SCALES)}")
     return known
 
 
@@ -46,15 +47,15 @@ def read_date(text: str, scale: str | None = None) -> Reading:
     julian = _JULIAN.fullmatch(stripped)
     match = julian or _DATE.fullmatch(stripped)
     if match is None:
-        raise ValueError(f"date {text!r} cannot be read: write it as 2016-02-13T16:00:00 and {HINT.removeprefix('add ')}")
+        raise ValueError(f"date {shown(text)} cannot be read: write it as 2016-02-13T16:00:00 and {HINT.removeprefix('add ')}")
     found = match.groupdict()
     named = found.get("scale") or found.get("bracket") or ("UTC" if found.get("zone") else None)
     if named is None and scale is None:
-        raise ValueError(f"date {text!r} has no time scale: {HINT}")
+        raise ValueError(f"date {shown(text)} has no time scale: {HINT}")
     kind = scale_named(named or str(scale), text)
     reading = _julian(found, kind) if julian else _calendar(found, kind, text)
     if kind == "UTC" and reading.day < scales.UTC_BEGINS:
-        raise ValueError(f"date {text!r}: there is no UTC before 1960; give it in UT1 or TT")
+        raise ValueError(f"date {shown(text)}: there is no UTC before 1960; give it in UT1 or TT")
     return reading
 
 
@@ -75,13 +76,13 @@ def _calendar(found: dict[str, str | None], scale: str, text: str) -> Reading:
     seconds = 3600 * hour + 60 * minute + second
     leap = scale == "UTC" and second == 60 and (hour, minute) == (23, 59)
     if hour > 24 or minute > 59 or (second > 59 and not leap) or (hour == 24 and (minute or second or fraction)):
-        raise ValueError(f"date {text!r}: {found['hour']}:{found['minute']}:{found['second'] or '00'} is no time of a day")
+        raise ValueError(f"date {shown(text)}: {found['hour']}:{found['minute']}:{found['second'] or '00'} is no time of a day")
     zone = found.get("zone")
     if zone and zone != "Z":
         seconds -= (60 * int(zone[1:3]) + int(zone[4:6])) * 60 * (-1 if zone[0] == "-" else 1)
         day, seconds = day + seconds // 86400, seconds % 86400
     if leap and seconds >= scales.length_of_day(np.array(float(day))):
-        raise ValueError(f"date {text!r}: that day did not end with a leap second")
+        raise ValueError(f"date {shown(text)}: that day did not end with a leap second")
     return Reading(scale, float(day), float(seconds), fraction)
 
 
@@ -97,7 +98,7 @@ def _day(year: int, found: dict[str, str | None], text: str) -> int:
         else:
             date = datetime.date(year, int(found["month"] or 1), int(found["day"] or 1))
     except (ValueError, OverflowError):
-        raise ValueError(f"date {text!r}: the calendar has no such day") from None
+        raise ValueError(f"date {shown(text)}: the calendar has no such day") from None
     return date.toordinal() - datetime.date(1970, 1, 1).toordinal() + int(_ZERO_UNIX)
 
 

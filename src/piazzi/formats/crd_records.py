@@ -21,6 +21,7 @@ from piazzi.formats.crd_headers import (
     read_version,
 )
 from piazzi.formats.fields import number, number_or_nan
+from piazzi.text import one_line
 
 _DATA = frozenset(("12", "20", "21", "30", "40", "41", "42", "50", "60"))
 _NOISE = b"1"  # filter flag of a full rate row; 0 unknown, 2 data
@@ -152,7 +153,7 @@ class _Reader:
             if self.open:
                 laser.sessions[-1] = replace(laser.sessions[-1], prediction=" ".join(fields[1:]))
         elif self.open:
-            raise ValueError(f"{kind} within the pass that began in line {laser.sessions[-1].line}; H8 is missing")
+            raise ValueError(f"{one_line(kind, 20)} within the pass that began in line {laser.sessions[-1].line}; H8 is missing")
         elif kind == "H1":
             self.version, self.station, self.target, self.configuration = read_version(fields), None, None, {}
         elif not self.version:
