@@ -14,7 +14,7 @@ import sys
 from html import escape
 from pathlib import Path
 
-SAID = re.compile(r'<meta name="version" content="([\w.+-]+)"')
+SAID = re.compile(r'<meta content="([\w.+-]+)" name="version"')
 PLACE = '<div class="sidebar-tree">'
 PAGE = """<!doctype html>
 <html lang="en-GB"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">

@@ -14,7 +14,7 @@ try:
 finally:
     sys.path.pop(0)
 
-PAGE = '<html><head><meta name="version" content="{}"></head><body><div class="sidebar-tree">{}</div></body></html>'
+PAGE = '<html><head><meta content="{}" name="version" /></head><body><div class="sidebar-tree">{}</div></body></html>'
 
 
 def built(folder, version, word=""):
