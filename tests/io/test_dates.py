@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import piazzi as pz
-from piazzi.cli import options
+from piazzi.cli import conventions
 from piazzi.earth.columns import read_dates
 from piazzi.earth.scales import SCALES
 from piazzi.io import load_estimate, save, save_estimate
@@ -49,7 +49,7 @@ def read(folder, text, given=PROBLEM, scale=None):
 
 
 def test_the_command_line_knows_the_scales():
-    assert options.SCALES == SCALES
+    assert conventions.SCALES == SCALES
 
 
 def one_by_one(texts, scale=None):
