@@ -66,7 +66,8 @@ def read_dates(texts: Array, scale: str | None = None, place: Callable[[int], st
     if other.size:
         i = int(other[0])
         here, before = known[kinds[i]], known[kinds[0]]
-        raise ValueError(f"{place(i)}date {shown(_text(texts[i]))} is in {here}, those before in {before}; one file has one scale")
+        date = shown(_text(texts[i]))
+        raise ValueError(f"{place(i)}date {date} is in {here}, those before in {before}; one file has one scale")
     kind = known[int(kinds[0])]
     return Instants(kind, *scales.to_tt(kind, day, seconds, fraction, orientation(kind)))
 

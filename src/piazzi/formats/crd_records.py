@@ -153,7 +153,8 @@ class _Reader:
             if self.open:
                 laser.sessions[-1] = replace(laser.sessions[-1], prediction=" ".join(fields[1:]))
         elif self.open:
-            raise ValueError(f"{one_line(kind, 20)} within the pass that began in line {laser.sessions[-1].line}; H8 is missing")
+            began = laser.sessions[-1].line
+            raise ValueError(f"{one_line(kind, 20)} within the pass that began in line {began}; H8 is missing")
         elif kind == "H1":
             self.version, self.station, self.target, self.configuration = read_version(fields), None, None, {}
         elif not self.version:
