@@ -4,11 +4,15 @@ import json
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi.determination import determining
+from piazzi.determination.case import Case
+from piazzi.earth.eop import tables
 from piazzi.formats import Arc, Ephemeris, oem_text
 from tests.determination.fixing import EPOCH, truth
 
@@ -158,3 +162,45 @@ def test_the_problem_is_a_scenario_that_other_commands_load(folder):
     again = program(folder, "problem.toml", "one.oem", "--json")
     assert again.returncode == 0, again.stderr
     assert json.loads(again.stdout)["mean"] == found.to_dict()["mean"]
+
+
+@pytest.mark.slow
+def test_a_problem_with_air_that_varies_is_a_scenario_too(tmp_path):
+    """Harris and Priester's density and its process are written, and give the same bits again."""
+    forces = "gravity=EGM2008 degree=2 bodies=no tides=no relativity=no radiation=no drag=harris-priester"
+    state = {"position": [[6828e3, 0.0, 0.0]] * 2, "velocity": [[0.0, -970.0, 7576.0]] * 2}
+    said = {"frame": "GCRF", "centre": "EARTH", "scale": "UTC", "name": "LOW"}
+    start = Arc(epoch=EPOCH, t=np.array([0.0, 60.0]), **{k: np.array(v) for k, v in state.items()}, **said)
+    (tmp_path / "start.oem").write_text(oem_text(Ephemeris(arcs=(start,))))
+    went = program(
+        tmp_path, "start.oem", "--from", EPOCH.to("UTC"), "--to", "1 day", "--step", "900s", "--forces",
+        f"{forces} cd_a_m=0.02", "-o", "truth.oem", name="propagate",
+    )  # fmt: skip
+    assert went.returncode == 0, went.stderr
+    arc = pz.read_ephemeris(tmp_path / "truth.oem").arcs[0]
+    noise, rough = np.random.default_rng(5).standard_normal((2, len(arc.t), 3))
+    fixes = replace(arc, position=arc.position + 5.0 * noise, velocity=arc.velocity + 1e3 * rough)
+    (tmp_path / "fixes.oem").write_text(oem_text(Ephemeris(arcs=(fixes,))))
+    words = ("--sigma", "5m", "--sigma", "1000m/s", "--forces", forces, "--anyway")
+    done = program(tmp_path, "fixes.oem", *words, "-o", "problem.toml", "-o", "first.json")
+    assert done.returncode in (0, 3) and (tmp_path / "problem.toml").exists(), done.stderr
+    first = json.loads((tmp_path / "first.json").read_text())
+    assert "density_8" in first["names"]
+    problem, tracking = pz.load(tmp_path / "problem.toml", seed=1)
+    assert len(tracking.times) == len(arc.t) and {f"air_{k}" for k in range(1, 9)} <= set(problem.model.names)
+    again = program(tmp_path, "problem.toml", "fixes.oem", "-o", "again.json", "-o", "again.toml")
+    assert (tmp_path / "again.json").exists(), again.stderr
+    second = json.loads((tmp_path / "again.json").read_text())
+    assert (second["mean"], second["covariance"]) == (first["mean"], first["covariance"])
+    assert (tmp_path / "again.toml").read_text() == (tmp_path / "problem.toml").read_text()
+
+
+def test_a_problem_that_files_cannot_hold_is_said_before_the_work(folder, monkeypatch):
+    """Tables of the Earth's orientation that are from no file."""
+    monkeypatch.setattr(determining, "ready", lambda given: pytest.fail("worked before it said what cannot be written"))
+    eop = replace(tables(), source="nowhere")
+    forces = pz.earth.ForceChoice(pz.earth.Forces(degree=12, radiation="cannonball"), "given", eop=eop)
+    case = Case.of({"output": ["problem.toml"], "sigma": ["1000m/s", "5m"]})
+    case = replace(case, forces=forces)
+    with pytest.raises(ValueError, match=r"-o problem.toml: Earth orientation of 'nowhere' cannot be written to a file"):
+        determining.determined([folder / "one.oem"], case)

@@ -11,7 +11,7 @@ from piazzi import earth
 from piazzi.earth.eop import ARCSEC, tables
 from piazzi.earth.scales import DAY, TT_TAI
 from piazzi.earth.subdaily import libration, ocean_tides, subdaily
-from piazzi.scenarios.functions import written_orientation
+from piazzi.scenarios.earth_functions import written_orientation
 
 EPOCH = pz.Epoch("2016-12-30T07:13:11.3 UTC")  # two days before a leap second
 LEAP = pz.Epoch("2017-01-01T00:00:00 UTC") - EPOCH

@@ -1,13 +1,21 @@
 """Functions from outside and roots in scenarios: tables, files beside it, faults with their place, files that keep them."""
 
+import tomllib
+
 import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi.earth.celestial import Asteroid
 from piazzi.io.files import save
+from piazzi.io.scenario_text import scenario_text
 from piazzi.outside.table import Table
+from piazzi.scenarios.earth_sensors import _place_of, write_place
+from piazzi.scenarios.functions import read_functions, write_function
 from piazzi.scenarios.loader import load_scenario
-from piazzi.scenarios.table import ScenarioError
+from piazzi.scenarios.table import Faults, ScenarioError
+from piazzi.scenarios.table import Table as Keys
+from piazzi.scenarios.write import problem_from_tables
 
 TEXT = """title = "A pushed oscillator, seen with a delay"
 [states]
@@ -206,3 +214,75 @@ def test_an_interpolation_beside_the_scenario_is_a_function_of_it(scenario, tmp_
     again = pz.load(tmp_path / "r.nc")[0]
     assert again.checksums == problem.checksums
     np.testing.assert_array_equal(again.dynamics([1.0, 0.2], 0.7), problem.dynamics([1.0, 0.2], 0.7))
+
+
+DAY = pz.Epoch("2024-03-10T00:00:00 UTC")
+LOW = [6.8e6, 0.0, 0.0, 0.0, 5.4e3, 5.4e3]
+
+
+def posed(forces, functions):
+    """A problem of forces about the Earth or the Sun, whose numbers are all one."""
+    model = forces.model(pz.Sensor("fix", ["x"]), functions=functions)
+    parameters = {p.name: 1.0 for p in model.parameters}
+    prior, station = pz.Gaussian(LOW, np.eye(6)), pz.Station("s", "fix", 1.0)
+    return pz.Problem(model, prior, None, station, parameters, epoch=DAY, functions=functions)
+
+
+def again(problem):
+    """The problem that its tables give, by way of TOML."""
+    tables = tomllib.loads(scenario_text(problem))
+    own = {key: value for key, value in tables.items() if key not in ("times", "title", "study")}
+    return problem_from_tables(own, problem.name, "here")
+
+
+@pytest.mark.filterwarnings("ignore:places of planets by series")
+@pytest.mark.parametrize(
+    "words",
+    [
+        {"degree": 4, "drag": "harris-priester"},
+        {"degree": 4, "tides": ("solid", "k1", "pole"), "relativity": ("schwarzschild", "lense-thirring", "de-sitter")},
+        {"about": "sun"},
+    ],
+    ids=["harris-priester", "tides, relativity", "sun"],
+)
+def test_all_data_of_forces_are_written(words):
+    forces = pz.earth.Forces(**words)
+    problem = posed(forces, forces.functions(DAY))
+    found = again(problem)
+    assert found.checksums == problem.checksums
+    x = [1.6e11, 2e10, 1e9, 1e3, 2e4, 1e3] if "about" in words else LOW
+    np.testing.assert_array_equal(found.dynamics(x, 431.0), problem.dynamics(x, 431.0))
+
+
+def read_back(function):
+    faults = Faults()
+    found = read_functions(Keys({"f": write_function(function)}, "functions", faults), DAY)
+    assert not faults, list(faults)
+    return found["f"]
+
+
+def test_data_of_files_are_written_by_whole_paths(tmp_path, monkeypatch):
+    kernel, weather = tmp_path / "few.bsp", tmp_path / "SW-All.csv"
+    kernel.write_bytes(b"DAF/SPK ".ljust(1024, b"\0"))
+    rows = ["DATE,BSRN,ND,KP1,AP1,AP2,AP3,AP4,AP5,AP6,AP7,AP8,AP_AVG,F10.7_OBS,F10.7_DATA_TYPE,F10.7_OBS_CENTER81"]
+    rows += [f"2024-03-{day:02},1,1,20,{','.join('4' * 8)},4,150,OBS,150" for day in range(1, 12)]
+    weather.write_text("\n".join(rows) + "\n")
+    air = pz.earth.Thermosphere(DAY, LOW, weather, 60.0)
+    asteroid, moon = Asteroid(4, DAY, kernel), pz.earth.Body("moon", DAY, str(kernel), "sun", "TDB")
+    monkeypatch.chdir(tmp_path)
+    near = pz.earth.Body("moon", DAY, "few.bsp", "sun", "TDB")
+    monkeypatch.chdir("/")
+    assert [read_back(f).checksum for f in (air, asteroid, moon)] == [f.checksum for f in (air, asteroid, moon)]
+    monkeypatch.chdir(tmp_path)
+    assert write_function(near)["kernel"] == str(kernel)
+    kernel.unlink()
+    with pytest.raises(ValueError, match=r"kernel of .*few\.bsp' cannot be written to a file: there is no such file"):
+        write_function(moon)
+
+
+@pytest.mark.parametrize("about", ["earth", "sun"])
+def test_places_say_what_they_are_seen_from(about):
+    site = pz.earth.Station.geodetic("A", 0.4, 0.3, 100.0)
+    for station in (site, None):
+        place = pz.earth.Place(station, DAY, about=about)
+        assert _place_of(write_place(place), DAY).checksum == place.checksum

@@ -17,7 +17,7 @@ from piazzi.earth import Epoch, ForceChoice, Forces
 from piazzi.earth.defaults import DATA
 from piazzi.formats import KINDS, Observations
 from piazzi.io.atomic import atomic_path
-from piazzi.scenarios.functions import written_orientation
+from piazzi.scenarios.earth_functions import written_orientation
 from piazzi.scenarios.toml_text import toml_text
 
 

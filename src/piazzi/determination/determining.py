@@ -29,6 +29,7 @@ from piazzi.determination.initial import initial_orbits
 from piazzi.determination.initial_result import InitialOrbits
 from piazzi.determination.instruments import with_instruments
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
+from piazzi.determination.products import check_writable
 from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.determination.setup import Setup, at_last_used, posed, setup
@@ -132,6 +133,7 @@ def determined(
         frame_named(case.frame)
     say("reading")
     given = prepared(*tracking, case=case)
+    check_writable(given.problem, case.output)
     axes = answer_axes(given, case.frame)
     say("approaching")
     centre = given.measured.centre

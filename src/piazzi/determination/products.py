@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +26,7 @@ from piazzi.io import hdf5
 from piazzi.io.atomic import atomic_path
 from piazzi.io.scenario_text import scenario_text
 from piazzi.orbit import fit_sgp4
+from piazzi.problem import Problem
 from piazzi.text import escape_formula, printable
 
 ENDINGS = (".oem", ".opm", ".ocm", ".omm", ".tle", ".nc", ".csv", ".json", ".toml")
@@ -39,6 +40,16 @@ def check_ending(path: Any) -> str:
     if ending not in ENDINGS:
         raise ValueError(f"-o {path}: a product ends in {', '.join(ENDINGS)}")
     return ending
+
+
+def check_writable(problem: Problem, paths: Iterable[Any]) -> None:
+    """Raise ValueError where a scenario is among the products and cannot hold the problem: before the work, not behind it."""
+    for path in paths:
+        if check_ending(path) == ".toml":
+            try:
+                scenario_text(problem)
+            except ValueError as error:
+                raise ValueError(f"-o {path}: {error}") from None
 
 
 def write(found: Any, path: Any, *, span: Any = None, step: float | None = None, formal: bool | None = None) -> None:

@@ -79,7 +79,7 @@ class SpaceWeather:
         i = int(day - self.mjd[0])
         if not 3 <= i < len(self.mjd):
             span = f"{mjd_text(self.mjd[0] + 3)} to {mjd_text(self.mjd[-1])}"
-            raise ValueError(f"{self.source} has space weather from {span}, not for {mjd_text(day)}")
+            raise ValueError(f"{Path(self.source).name} has space weather from {span}, not for {mjd_text(day)}")
         slots = self.ap3[: i + 1].ravel()
         now = 8 * i + min(int(seconds // 10800), 7)
         recent = [slots[now - k] for k in range(4)]
@@ -87,9 +87,9 @@ class SpaceWeather:
         predicted = bool(self.kind[i] != OBSERVED)
         if predicted and not self._warned:
             self._warned.append(True)
+            where = f"{Path(self.source).name}, measured to {mjd_text(self.measured)}"
             warnings.warn(
-                f"F10.7 and Ap of {mjd_text(day)} are predicted ({self.source}, measured to {mjd_text(self.measured)}): density"
-                " may be off by 20 to 50 %",
+                f"F10.7 and Ap of {mjd_text(day)} are predicted ({where}): density may be off by 20 to 50 %",
                 SpaceWeatherWarning,
                 stacklevel=2,
             )
@@ -202,4 +202,4 @@ def _daily(path: Path, rows: list[_Row]) -> SpaceWeather:
     ap3, kind = np.full((len(mjd), 8), QUIET_AP), np.full(len(mjd), MONTHLY, dtype=np.uint8)
     ap3[at], kind[at] = [row.ap3 for row in kept], [row.kind for row in kept]
     flux, average = (np.interp(mjd, days, [row[i] for row in kept]) for i in (2, 3))
-    return SpaceWeather(mjd, flux, average, ap3, kind, path.name)
+    return SpaceWeather(mjd, flux, average, ap3, kind, str(path))

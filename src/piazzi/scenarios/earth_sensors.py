@@ -25,6 +25,7 @@ KINDS = (
 )  # fmt: skip
 DIMENSIONS = {"m": "length", "m/s": "length/time", "rad": "angle"}
 AXES = ("up", "north", "east")
+ABOUT = ("earth", "sun")
 PLACE = ("site", "place", "weather", "tides")
 
 
@@ -152,21 +153,19 @@ def write_place(place: Any) -> dict[str, Any]:
     """The table that `read_place` reads back; raises ValueError for a place that files cannot hold."""
     from piazzi.earth.tabulated import Place
     from piazzi.outside.table import Table as Samples
-    from piazzi.scenarios.functions import write_function, written_orientation
+    from piazzi.scenarios.earth_functions import written_orientation
+    from piazzi.scenarios.functions import write_function
 
     if isinstance(place, Samples):
         return write_function(place)
     if not isinstance(place, Place):
         raise ValueError(f"place {type(place).__name__} cannot be written to a file: it is known in Python only")
     station = place.station
-    assert station is not None, "scenarios have no station at the centre of the Earth"
-    out: dict[str, Any] = {
-        "kind": "station",
-        "name": station.name,
-        "tides": place.tides,
-        "coordinates": [_dated(c, {"position": list(c.position), "velocity": list(c.velocity)}) for c in station.coordinates],
-        "eccentricities": [_dated(e, {"up": e.up, "north": e.north, "east": e.east}) for e in station.eccentricities],
-    }
+    out: dict[str, Any] = {"kind": "centre" if station is None else "station", "tides": place.tides, "about": place.about}
+    if station is not None:
+        markers = [_dated(c, {"position": list(c.position), "velocity": list(c.velocity)}) for c in station.coordinates]
+        offsets = [_dated(e, {"up": e.up, "north": e.north, "east": e.east}) for e in station.eccentricities]
+        out |= {"name": station.name, "coordinates": markers, "eccentricities": offsets}
     return out if place.eop is None else out | {"eop": written_orientation(place.eop)}
 
 
@@ -193,7 +192,13 @@ def _place_of(given: Any, epoch: Epoch) -> Any:
     def dated(row: Mapping[str, Any]) -> dict[str, Any]:
         return {key: Instant(value) if key in ("since", "until", "reference") else value for key, value in row.items()}
 
-    markers = tuple(Coordinates(**dated(row)) for row in given.get("coordinates", ()))
-    offsets = tuple(Eccentricity(**dated(row)) for row in given.get("eccentricities", ()))
+    station = None
+    if given.get("kind") != "centre":
+        markers = tuple(Coordinates(**dated(row)) for row in given.get("coordinates", ()))
+        offsets = tuple(Eccentricity(**dated(row)) for row in given.get("eccentricities", ()))
+        station = Station(str(given.get("name", "")), markers, offsets)
     eop = None if given.get("eop") is None else read_data("eop", given["eop"], Path())
-    return Place(Station(str(given.get("name", "")), markers, offsets), epoch, eop, bool(given.get("tides", True)))
+    about = given.get("about", "earth")
+    if about not in ABOUT:
+        raise ValueError(f"place: about is {shown(about)}{nearest(str(about)[:60], ABOUT)}")
+    return Place(station, epoch, eop, bool(given.get("tides", True)), about)
