@@ -7,11 +7,15 @@ import pytest
 
 from piazzi.determination import density
 from piazzi.determination.approach import approached
+from piazzi.determination.course import _with_density, course_of
 from piazzi.determination.density import with_density
+from piazzi.determination.determining import ready, solved
+from piazzi.determination.fit import estimators
 from piazzi.determination.orbit_forces import AirVaries, air_varies
 from piazzi.determination.physical import air_of, is_node, nodes_of
 from piazzi.determination.setup import follow
 from piazzi.estimate.chi_square import quantile
+from piazzi.orbit import state_axes
 from tests.references.determinations import AIR, KINDS, begun, consistency, drawn, predictions, within
 
 
@@ -93,3 +97,32 @@ def test_a_departure_that_never_ends_is_a_wrong_coefficient():
     by = (Phi[1] @ Phi[0])[:6, place] * 0.1
     assert not found[0].any()
     np.testing.assert_allclose(found[2], np.outer(by, by), rtol=1e-4, atol=1e-4 * np.abs(np.outer(by, by)).max())
+
+
+@pytest.mark.slow
+def test_a_file_of_a_determination_predicts_as_surely_as_the_determination():
+    """That of before held the density at its last value for sure: three days on its sigma was a third of what it is."""
+    given = begun(AIR)
+    found = solved(ready(drawn(AIR, given, 3)[0]), estimators(("graph",)))
+    read = course_of(found.to_dict(), found.epoch)
+    assert any("held at what was estimated" in text for text in read.assumed)
+    for days in (1.0, 3.0):
+        when = found.epoch + 86400.0 * days
+        x, P = found.orbit.at(when), found.orbit.covariance(when, "RTN")
+        there, wide = read.beliefs(np.array([when - read.epoch]))
+        axes = state_axes(x[:3], x[3:])[:3, :3]
+        sigma = np.sqrt(np.diag(axes @ wide[0, :3, :3] @ axes.T))
+        ratio = sigma / np.sqrt(np.diag(P)[:3])
+        assert (ratio > 0.6).all() and (ratio < 1.5).all(), ratio
+        assert (np.abs(axes @ (there[0, :3] - x[:3])) < 2.0 * sigma).all()
+
+
+def test_the_density_of_a_file_is_that_at_its_epoch():
+    """Between nodes it is linear, as it was estimated; its covariance goes into the coefficient of drag."""
+    names = ["x", "cd_a_m", "density_1", "density_2"]
+    dates = [-3600.0, 10800.0]
+    P = np.diag([1.0, 0.04, 0.09, 0.16])
+    mean, wide = _with_density(dates, names, np.array([0.0, 2.0, 0.2, -0.2]), P)
+    assert mean.tolist() == pytest.approx([0.0, 2.0 * 1.1, 0.2, -0.2])
+    assert wide[1, 1] == pytest.approx(1.1**2 * 0.04 + 2.0**2 * (0.75**2 * 0.09 + 0.25**2 * 0.16))
+    assert _with_density([], names, mean, P)[1] is P

@@ -9,16 +9,17 @@ import json
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from piazzi.determination.beliefs import beliefs, carried_to
 from piazzi.determination.centres import EARTH, Centre, centre_of
-from piazzi.determination.earlier import density_now
+from piazzi.determination.density import departed
 from piazzi.determination.guesses import CARTESIAN, SCHEMA, Guess, guess_of
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
+from piazzi.determination.physical import DENSITY
 from piazzi.determination.sun_forces import forces_about_the_sun
 from piazzi.earth import EphemerisWarning, Epoch, Forces
 from piazzi.earth.rotation import frame_named
@@ -154,12 +155,16 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
         said = {**facts["forces"]}
         constants = {str(one["name"]) for one in facts["estimated"]}
         frame, name = str(facts["frame"]), str(facts.get("object") or "")
-    except (KeyError, TypeError, ValueError) as error:
+        dates = [Epoch(str(when)) - guess.epoch for when in facts.get("density") or ()]
+        last = (facts.get("span") or {}).get("last")
+        behind = 0.0 if dates or last is None else max(Epoch(str(last)) - guess.epoch, 0.0)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{source}: the determination is not whole: {' '.join(str(error).split())}") from None
     if not (np.isfinite(P).all() and P.shape == (len(names), len(names)) and np.isfinite(mean).all()):
         raise ValueError(f"{source}: the determination has no finite covariance")
     chosen = _chosen(_forces_of(said, source, guess.about), guess.state, name, guess.about)
-    mean, P = _with_density(facts, names, mean, P, guess.epoch)
+    usual = float(mean[names.index("cd_a_m")]) if "cd_a_m" in names else 0.0
+    mean, P = _with_density(dates, names, mean, P)
     own = [p for p in chosen.forces.parameters if p in constants and p in names]
     roles = {p: role for p, role in chosen.roles.items() if p in own} | dict.fromkeys(own, "estimated")
     values: dict[str, Any] = {**_numbers(chosen)}
@@ -172,7 +177,8 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
     first = np.concatenate([guess.state, mean[order[6:]]])
     assumed = tuple(str(text) for text in facts.get("assumed", ()))
     carry = _carrying(problem, chosen.max_step, first, moved)
-    return Course(name, problem, carry, source, assumed, centre=centre_of(guess.about))
+    found = Course(name, problem, carry, source, assumed, centre=centre_of(guess.about))
+    return _departing(found, chosen, first, usual, behind, bool(dates))
 
 
 def _chosen(forces: Any, state: Array, name: str, about: str) -> Chosen:
@@ -180,16 +186,46 @@ def _chosen(forces: Any, state: Array, name: str, about: str) -> Chosen:
     return forces_about_the_sun(forces, state) if about == "sun" else chosen_forces(forces, state, name=name)
 
 
-def _with_density(facts: Mapping[str, Any], names: list[str], mean: Array, P: Array, epoch: Epoch) -> tuple[Array, Array]:
-    """Means and their covariance with the air's density at the epoch, where it was estimated, in the coefficient of drag."""
-    now = density_now(facts, epoch)
-    if now not in names or "cd_a_m" not in names:
+def _with_density(dates: Sequence[float], names: list[str], mean: Array, P: Array) -> tuple[Array, Array]:
+    """Means and their covariance with the air's density at the epoch in the coefficient of drag.
+
+    `dates` are those at which it was estimated, s past the epoch; empty where it was not.
+    """
+    nodes = [names.index(f"{DENSITY}{k}") for k in range(1, len(dates) + 1) if f"{DENSITY}{k}" in names]
+    if not nodes or len(nodes) != len(dates) or "cd_a_m" not in names:
         return mean, P
-    drag, air = names.index("cd_a_m"), names.index(now)
+    weights = np.array([np.interp(0.0, dates, row) for row in np.eye(len(dates))])
+    drag, air = names.index("cd_a_m"), float(weights @ mean[nodes])
     J, mean = np.eye(len(names)), mean.copy()
-    J[drag, drag], J[drag, air] = 1.0 + mean[air], mean[drag]
-    mean[drag] = max(mean[drag] * (1.0 + mean[air]), 0.0)
+    J[drag, drag], J[drag, nodes] = 1.0 + air, mean[drag] * weights
+    mean[drag] = max(mean[drag] * (1.0 + air), 0.0)
     return mean, J @ P @ J.T
+
+
+def _departing(found: Course, chosen: Chosen, first: Array, usual: float, behind: float, known: bool) -> Course:
+    """The orbit with covariances that have in them how density departs.
+
+    Where it was estimated, `known`, it departs from that at the epoch; else `behind` the last measurement (s).  It does so by a
+    share of what it is with the `usual` coefficient of drag.
+    """
+    air, names, problem = chosen.air_varies, found.problem.model.names, found.problem
+    if air is None or "cd_a_m" not in names:
+        return found
+    place, sigma = names.index("cd_a_m"), air.sigma * usual
+    law = sigma, air.time, 0.0 if known else sigma
+    there = first
+    if behind > 0.0:
+        there = carried_to(problem, chosen.max_step, 0.0, first, np.eye(len(first)), np.array([behind]))[0][0]
+
+    def at(t: Array) -> tuple[Array, Array | None]:
+        x, P = found.beliefs(t)
+        for side in (t > behind, (t < 0.0) & known):
+            if P is not None and side.any():
+                P[side] += departed(problem, chosen.max_step, behind, there, place, law, t[side])
+        return x, P
+
+    held = ("the density of the air is held at what was estimated at the epoch, and departs from it",) if known else ()
+    return replace(found, beliefs=at, assumed=(*found.assumed, *held))
 
 
 def _forces_of(said: Mapping[str, Any], source: str, about: str) -> Forces:

@@ -26,7 +26,7 @@ from piazzi.determination.unknowns import Label
 from piazzi.earth import Epoch
 from piazzi.earth.force_text import LATITUDE
 from piazzi.estimate.estimator import Estimate
-from piazzi.problem import Gaussian
+from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 
 COUNT = 8  # nodes over the measurements, however long these are: another number would compile other kernels
@@ -121,27 +121,46 @@ def departure(given: Setup, estimate: Estimate, t: Array) -> Array:
     air, place = given.chosen.air_varies, _place(given)
     measured = np.isfinite(given.tracking.values).any(axis=1)
     last = float(given.tracking.row_times[measured][-1]) if measured.any() else np.inf
-    late = np.flatnonzero(t > last)
+    start = float(estimate.times[-1])
+    late = np.flatnonzero(t > max(last, start))
     if air is None or place is None or not len(late) or not given.problem.is_noise_free:
         return out
-    start = float(estimate.times[-1])
-    nodes = np.unique(np.concatenate([[start], np.arange(start, t.max(), air.time / PARTS), t[t > start]]))
-    _, Phi = follow(given.problem, nodes, estimate.mean[-1], given.chosen.max_step)
-    S = np.zeros((7, 7))
     known = f"{AIR}1" in given.problem.model.names  # and of a share of the usual coefficient, else of that of the answer
     sigma = air.sigma * (1.0 if known else float(value_of(estimate.mean[-1, place])))
-    S[6, 6] = 0.0 if known else sigma**2
-    found = {start: S[:6, :6].copy()}
+    first = 0.0 if known else sigma
+    out[late] = departed(
+        given.problem, given.chosen.max_step, start, estimate.mean[-1], place, (sigma, air.time, first), t[late]
+    )
+    return out
+
+
+def departed(
+    problem: Problem, step: float, start: float, x: Array, place: int, law: tuple[float, float, float], t: Array
+) -> Array:
+    """Covariance (K, 6, 6) at times, all after `start` or all before, by what drag departs by meanwhile.
+
+    Parameters
+    ----------
+    problem, step : that moves the state `x` (n,), by steps of at most so many seconds
+    place : of the coefficient of drag in it
+    law : of the process: its steady sigma in that coefficient, its time (s), and its sigma at the start
+    """
+    sigma, time, first = law
+    away = np.abs(t - start)
+    every = time / PARTS if t[0] > start else min(step, time / PARTS)
+    nodes = np.unique(np.concatenate([[0.0], np.arange(0.0, away.max(), every), away]))
+    _, Phi = follow(problem, start + nodes if t[0] > start else start - nodes, x, step)
+    S = np.zeros((7, 7))
+    S[6, 6] = first**2
+    found = {0.0: S[:6, :6].copy()}
     A = np.zeros((7, 7))
     for when, dt, one in zip(nodes[1:].tolist(), np.diff(nodes).tolist(), Phi, strict=True):
-        left = exp(-dt / air.time)
+        left = exp(-dt / time)
         A[:6, :6], A[:6, 6], A[6, 6] = one[:6, :6], one[:6, place], left
         S = A @ S @ A.T
         S[6, 6] += sigma**2 * (1.0 - left**2)
         found[when] = S[:6, :6].copy()
-    for k in late.tolist():
-        out[k] = found.get(float(t[k]), out[k])
-    return out
+    return np.array([found[when] for when in away.tolist()])
 
 
 def _place(given: Setup) -> int | None:
