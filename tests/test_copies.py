@@ -112,7 +112,7 @@ def samples():
     thrust = "def thrust(t):\n    return (2.0 * t,)\n\n\ndef thrust_partials(t):\n    return (2.0 * t, 2.0)\n"
     others += [pz.Interpolation([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 0.5, 0.2]), pz.InitialOrbits((), 0, 0), pz.Estimated("cr")]
     others += [pz.Function(thrust, arguments=1)]
-    results += [pz.propagate(problem, [10.0, 11.0]), determined()]
+    results += [pz.propagate(problem, [10.0, 11.0]), determined(), pz.Following()]
     found = [problem, tracking, *settings, *steps, *sessions, *parts, *others, *results]
     return {type(value).__name__: value for value in found}
 
@@ -129,7 +129,7 @@ PUBLIC = [name for name in pz.__all__ if inspect.isclass(getattr(pz, name)) and 
 
 
 @pytest.mark.parametrize("how", HOW)
-@pytest.mark.parametrize("name", [name for name in PUBLIC if name != "Integrator"])  # a protocol
+@pytest.mark.parametrize("name", [name for name in PUBLIC if name not in ("Integrator", "progress")])  # a protocol; a terminal
 def test_everything_public_has_copies(every, name, how):
     value = every[name]
     check_same(value, HOW[how](value), name)

@@ -37,6 +37,10 @@ FEWEST = 6  # values that an orbit is looked for in
 WRONG = "a whole run"
 
 
+def _silent(step: str) -> None:
+    """Say nothing of a step."""
+
+
 class Following:
     """A determination in progress: `take` rows as they come, `determination` at any time.
 
@@ -65,7 +69,7 @@ class Following:
             names = ", ".join(chosen)
             raise ValueError(f"--follow with {names}: it takes one that goes row by row: ekf, iekf, srekf, ukf or window:6h")
         self._check()
-        self.announce: Callable[[str], None] = lambda step: None
+        self.announce: Callable[[str], None] = _silent
         self.waiting, self._began, self._tried = "there are no measurements yet", time.perf_counter(), FEWEST // 2
         self._pending = [observations_of(files, self.case.answers)] if files else []
         self._seen: list[Observations] = []
