@@ -33,3 +33,13 @@ def test_an_integrator_without_a_name_is_refused():
     own = pz.Problem(problem.model, problem.prior, None, problem.stations, problem.parameters, Own())
     with pytest.raises(ValueError, match="integrator Own cannot be written"):
         problem_to_tables(own)
+
+
+def test_a_bias_that_a_sensor_names_among_its_numbers_is_a_parameter():
+    """Instruments say units of all that they use; what is estimated among it is no number of a station."""
+    sensor = pz.Sensor("s", {"z": "x + bias + gain"}, (), {}, {"bias": "m", "gain": "m"})
+    model = pz.Model(["x"], ["0"], [sensor], [pz.Parameter("bias", "estimated", "m")])
+    station = pz.Station("a", "s", 1.0, {"gain": 0.25})
+    problem = pz.Problem(model, pz.Gaussian([0.0], [1.0]), None, station, {"bias": pz.Gaussian(0.5, 1.0)})
+    found = problem_from_tables(json.loads(json.dumps(problem_to_tables(problem))), "", "here")
+    assert found.model.names == ("x", "bias") and found.measure("a", [1.0, 0.5], 0.0) == [1.75]

@@ -84,11 +84,13 @@ def _equations(model: Model) -> dict[str, Any]:
 
 def _sensor(model: Model, sensor: Sensor) -> dict[str, Any]:
     own = [name for name in model.numbers(sensor) if name != STATION_TABLE]
+    taken = {*model.names, *(p.name for p in model.parameters)}  # biases of instruments stand among the parameters
+    units = {name: unit for name, unit in sensor.number_units if name not in taken}
     beside = dict(sensor.on_sky)
     rows = zip(sensor.components, sensor.equations, sensor.is_angle, dict(sensor.units).values(), strict=True)
     return {
         **({"visible": list(sensor.visible)} if sensor.visible else {}),
-        "numbers": dict.fromkeys(own, "") | dict(sensor.number_units),
+        "numbers": dict.fromkeys(own, "") | units,
         "definitions": _values(sensor.definitions),
         "roots": {d.names[0]: _root(d) for d in sensor.definitions if d.function == ROOT},
         "components": {
