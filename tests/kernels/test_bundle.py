@@ -270,7 +270,7 @@ def test_entries_are_opened_into_pointers():
     assert flat(signatures(source)["go"]) == [
         *("integer", "real", "floats", "indices", "floats", "indices", "floats"),
         "floats",
-        *("integer", "floats", "indices"),
+        *("integer", "floats", "indices", "indices"),
         "integer",
     ]
     assert definitions(source).splitlines() == [

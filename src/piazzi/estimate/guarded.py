@@ -154,7 +154,8 @@ class GuardedLiveFilter(LiveFilter):
 
     def _checked(self, saved: Mapping[str, Array]) -> dict[str, Array]:
         values, rows_of = Saved(saved, self.problem).measurements("epoch_values", "epoch_stations")
-        return super()._checked(saved) | {"epoch_values": values, "epoch_stations": rows_of, "streak": checked_streak(saved)}
+        rows = {"epoch_values": values, "epoch_stations": rows_of, "streak": checked_streak(saved, self.problem)}
+        return super()._checked(saved) | rows
 
     def _set_state(self, kept: Mapping[str, Array]) -> None:
         super()._set_state(kept)
@@ -162,9 +163,6 @@ class GuardedLiveFilter(LiveFilter):
         self._streak[:] = kept["streak"]
 
 
-def checked_streak(saved: Mapping[str, Array]) -> Array:
+def checked_streak(saved: Mapping[str, Array], problem: Problem) -> Array:
     """Rows that a gate rejected in a row, before an epoch and with it, of a checkpoint: none in those of earlier versions."""
-    found = np.asarray(saved.get("streak", np.zeros(2)), dtype=float)
-    if found.shape != (2,) or not (np.isfinite(found).all() and (found >= 0).all() and (found == np.floor(found)).all()):
-        raise ValueError(f"the checkpoint's 'streak' is {found.tolist()}; it must be two counts")
-    return np.asarray(np.minimum(found, 2.0**31), dtype=np.int64)
+    return Saved({"streak": np.zeros(2), **saved}, problem).whole("streak", 2, 0, 2**31)

@@ -161,7 +161,7 @@ class LiveRootFilter(Session):
         found = {name: checked.mean(name) for name in ("base_mean", "mean")}
         found |= {name: checked.array(name, n, n) for name in ("base_root", "root")}
         values, rows_of = checked.measurements("epoch_values", "epoch_stations")
-        rows = {"epoch_values": values, "epoch_stations": rows_of, "streak": checked_streak(saved)}
+        rows = {"epoch_values": values, "epoch_stations": rows_of, "streak": checked_streak(saved, self.problem)}
         return found | rows | {"covariance": checked.covariance("covariance"), "clock": checked.clock("clock", 2)}
 
     def _set_state(self, kept: Mapping[str, Array]) -> None:

@@ -143,18 +143,18 @@ def _smooth(problem: Moving, nodes: Array, first: Array, steps: Steps, derivativ
 def _on_grid(problem: Moving, at: Array, first: Array, count: int, derivative: bool) -> tuple[int, int, float, Arc]:
     """So many equal steps of the multi-step method, or those before an event: how many, and how many epochs, until when."""
     n, K = len(first), len(at)
-    out, last, last_Phi = Arc(np.empty((K, n)), np.empty((K - 1, n, n) if derivative else (0, n, n))), first.copy(), np.eye(n)
+    out, last_Phi = Arc(np.empty((K, n)), np.empty((K - 1, n, n) if derivative else (0, n, n))), np.eye(n)
     out.x[0] = first
     assert problem.integrator is not None
     watched = ("events", "arc_watched") if problem.model.events else ("arc_unwatched",)
     fragments = ("matrices", *watched, f"gauss_jackson_{'rows' if derivative else 'state'}", "gauss_jackson")
     library = kernels.load(_spec(problem, problem.integrator.arc_scheme, fragments))
     done = np.array([count, K - 1, at[-1]])
-    library.run_multistep(K, at, count, problem.given_bundle, out.x, out.Phi, done, last, last_Phi)
+    library.run_multistep(K, at, count, problem.given_bundle, out.x, out.Phi, done, last_Phi)
     inside = int(done[1])
     if int(done[0]) < count:
         Phi = np.concatenate([out.Phi[:inside], last_Phi[None]]) if derivative else out.Phi
-        out = Arc(np.vstack([out.x[: inside + 1], last]), Phi)
+        out = Arc(out.x[: inside + 2], Phi)
     return int(done[0]), inside, float(done[2]), out
 
 

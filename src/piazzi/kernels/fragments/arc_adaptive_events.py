@@ -22,7 +22,9 @@ def propagate_arc(t, dt, count, x, p):
                 x = y
                 at += h
             else:
-                x, s = reach(e, s, many, t + at, h, x, y, own)
+                if s < 1.0:
+                    y, s = reach(e, s, many, t + at, h, x, own)
+                x = y
                 at += s * h
                 cross(t + at, x, e, own)
             if last and (e < 0 or fabs(dt - at) <= 1e-15 * fabs(dt)):
@@ -52,7 +54,8 @@ def propagate_arc_jacobian(t, dt, count, x, R, p):
                 x, R = y, S
                 at += h
             else:
-                y, S, s = reach_jacobian(e, s, many, t + at, h, x, R, y, S, own)
+                if s < 1.0:
+                    y, S, s = reach_jacobian(e, s, many, t + at, h, x, R, own)
                 at += s * h
                 jump, row = cross(t + at, y, e, own)
                 x, R = y, jumped(S, jump, row @ complete(S))

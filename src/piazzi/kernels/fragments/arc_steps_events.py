@@ -14,7 +14,9 @@ def cut_step(t, h, x, p):
         if e < 0:
             arrive(p)
             return y
-        x, s = reach(e, s, many, t + done, left, x, y, p)
+        if s < 1.0:
+            y, s = reach(e, s, many, t + done, left, x, p)
+        x = y
         done += s * left
         cross(t + done, x, e, p)
         if fabs(h - done) <= 1e-15 * fabs(h):
@@ -33,7 +35,8 @@ def cut_step_jacobian(t, h, x, R, p):
         if e < 0:
             arrive(p)
             return y, S
-        y, S, s = reach_jacobian(e, s, many, t + done, left, x, R, y, S, p)
+        if s < 1.0:
+            y, S, s = reach_jacobian(e, s, many, t + done, left, x, R, p)
         done += s * left
         jump, row = cross(t + done, y, e, p)
         x, R = y, jumped(S, jump, row @ complete(S))

@@ -213,13 +213,11 @@ def nudged_jacobian(e, t, h, x, R, p):
 
 
 @outlined
-def reach(e, s, many, t, h, x, y, p):
-    """The state where the step from x to y passes event e, about at the fraction s, and that fraction.
+def reach(e, s, many, t, h, x, p):
+    """The state where the step from x passes event e, about at the fraction s before its end, and that fraction.
 
     A step that reaches beyond the event sees a bend there, so this one ends a little before.
     """
-    if s == 1.0:
-        return y, s
     before = maximum(s - 0.5e-4, 0.5 * s) if many == 1 else s
     z = substep(t, before * h, x, p)
     if many == 1:
@@ -233,10 +231,8 @@ def reach(e, s, many, t, h, x, y, p):
 
 
 @outlined
-def reach_jacobian(e, s, many, t, h, x, R, y, S, p):
-    """The same with the derivative times the rows `R`, which is `S` at the end of the step."""
-    if s == 1.0:
-        return y, S, s
+def reach_jacobian(e, s, many, t, h, x, R, p):
+    """The same with the derivative times the rows `R`."""
     before = maximum(s - 0.5e-4, 0.5 * s) if many == 1 else s
     z, Z = substep_jacobian(t, before * h, x, R, p)
     if many == 1:

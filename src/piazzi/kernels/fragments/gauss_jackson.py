@@ -22,11 +22,12 @@ def rates_at(F, at):
 
 
 @entry
-@sizes(K="K", t="K", x="K N", Phi="* N N", done="3", last="N", last_Phi="N N")
-def run_multistep(
-    K: int, t: Array, steps: int, p: Given, x: Array, Phi: Array, done: Array, last: Array, last_Phi: Array
-) -> None:
-    """Of a model with events up to the step in which one may be passed: steps and epochs that are `done`, and until when."""
+@sizes(K="K", t="K", x="K N", Phi="* N N", done="3", last_Phi="N N")
+def run_multistep(K: int, t: Array, steps: int, p: Given, x: Array, Phi: Array, done: Array, last_Phi: Array) -> None:
+    """Of a model with events up to the step in which one may be passed: steps and epochs that are `done`, and until when.
+
+    The state there follows those of the epochs in `x`.
+    """
     F, kept, own = scratch(HISTORY), scratch(NN), watching(p)
     begin_derivatives(kept)
     begin, h = t[0], (t[K - 1] - t[0]) / steps
@@ -40,7 +41,7 @@ def run_multistep(
             z, Z = stepped(here - h, h, y, R, own)
             if may_pass(here - h, h, z, own):
                 done[0], done[1], done[2] = i - 1, k - 1, begin + (i - 1) * h
-                store(last, 0, y)
+                store(x, k * N, y)
                 write_last(last_Phi, R, kept)
                 return
             while k < K and t[k] <= here:
@@ -68,7 +69,7 @@ def run_multistep(
         if may_pass(here - h, h, z, own):
             done[0], done[1], done[2] = i - 1, k - 1, begin + (i - 1) * h
             sx, sv, SX, SV = corrected(F, at)
-            store(last, 0, joined(y, (h * h) * (q2 - doubled(v1) + doubled(sx)), h * (v1 + sv)))
+            store(x, k * N, joined(y, (h * h) * (q2 - doubled(v1) + doubled(sx)), h * (v1 + sv)))
             Z = joined_rows((h * h) * (Q2 - doubled_rows(V1) + doubled_rows(SX)), h * (V1 + SV))
             write_last(last_Phi, Z, kept)
             return

@@ -18,8 +18,8 @@ def propagate_arc_noise(t, dt, count, x, R, p, Q, scale):
         y, S, error = trial_jacobian(t + at, h, x, R, own)
         if error <= 1.0:
             e, s, many = crossing(t + at, h, x, y, own)
-            if e >= 0:
-                y, S, s = reach_jacobian(e, s, many, t + at, h, x, R, y, S, own)
+            if e >= 0 and s < 1.0:
+                y, S, s = reach_jacobian(e, s, many, t + at, h, x, R, own)
             part = h if e < 0 else s * h
             Q_step, _ = propagate_noise(Q_step, t + at, part, x, Q, own)
             at += part

@@ -14,8 +14,8 @@ def cut_step_noise(t, h, x, R, p, Q, Q_step):
         left = h - done
         y, S = substep_jacobian(t + done, left, x, R, p)
         e, s, many = crossing(t + done, left, x, y, p)
-        if e >= 0:
-            y, S, s = reach_jacobian(e, s, many, t + done, left, x, R, y, S, p)
+        if e >= 0 and s < 1.0:
+            y, S, s = reach_jacobian(e, s, many, t + done, left, x, R, p)
         Q_step, _ = propagate_noise(Q_step, t + done, left if e < 0 else s * left, x, Q, p)
         if e < 0:
             arrive(p)
