@@ -24,9 +24,7 @@ from piazzi.kernels.spec import lanes_with, machine_lanes
 
 LIMIT = 1e-12
 OF_FIELDS = 1e-8  # lanes sum fields in another order, 4e-15 sqrt(degree), which the estimate of an arc magnifies
-LAST_PLACES = (
-    4.0  # units in the last place of a state, in its sigma: what states that lie sigmas apart can tell of a covariance
-)
+LAST_PLACES = 4.0  # of a state, in its sigma: what states that lie sigmas apart can tell of a covariance
 
 
 @contextmanager
