@@ -163,11 +163,15 @@ def test_all_estimators_find_the_orbit_and_agree(Q):
     estimators += [] if Q else [pz.BatchLeastSquares()]
     graph = pz.FactorGraph().estimate(problem, tracking)
     for estimator in estimators:
-        found = estimator.estimate(problem, tracking)
-        assert found.success, found.message
-        sigma = np.sqrt(np.diagonal(found.covariance[-1]))
-        assert np.abs((found.mean[-1] - tracking.truth[-1]) / sigma).max() < 4.5
-        assert np.abs((found.mean[-1] - graph.mean[-1]) / sigma).max() < 0.5
+        assert_found(estimator.estimate(problem, tracking), tracking, graph)
+
+
+def assert_found(found, tracking, graph):
+    """The last state is the truth, and the graph's."""
+    assert found.success, found.message
+    sigma = np.sqrt(np.diagonal(found.covariance[-1]))
+    assert np.abs((found.mean[-1] - tracking.truth[-1]) / sigma).max() < 4.5
+    assert np.abs((found.mean[-1] - graph.mean[-1]) / sigma).max() < 0.5
 
 
 @pytest.mark.slow
@@ -254,11 +258,7 @@ def test_with_events_too_all_estimators_find_the_orbit_and_agree(Q):
     graph = pz.FactorGraph().estimate(problem, tracking)
     estimators = [pz.ExtendedKalmanFilter(), pz.Smoother(), graph, pz.SlidingWindow(15), pz.UnscentedKalmanFilter()]
     for estimator in [*estimators, pz.SquareRootKalmanFilter(), *([] if Q else [pz.BatchLeastSquares()])]:
-        found = graph if estimator is graph else estimator.estimate(problem, tracking)
-        assert found.success, found.message
-        sigma = np.sqrt(np.diagonal(found.covariance[-1]))
-        assert np.abs((found.mean[-1] - tracking.truth[-1]) / sigma).max() < 4.5
-        assert np.abs((found.mean[-1] - graph.mean[-1]) / sigma).max() < 0.5
+        assert_found(graph if estimator is graph else estimator.estimate(problem, tracking), tracking, graph)
 
 
 @pytest.mark.slow

@@ -46,14 +46,10 @@ def approached(given: Setup) -> Setup:
 
     An orbit that was known before stays: it is the prior.
     """
-    if given.before is not None:
+    start = _start(given)
+    if start is None:
         return given
-    times = given.tracking.times
-    begun = float(np.clip(given.guess.epoch - given.measured.epoch, times[0], times[-1]))
-    first = _state_at(given, begun)
-    here = _place(given, begun, first)
-    if here is None:
-        return given
+    begun, first, here = start
     unit = scale_of(given, first)
     before = first
     away = np.abs(given.tracking.row_times - begun)
@@ -71,17 +67,24 @@ def approached(given: Setup) -> Setup:
 
 def refined(given: Setup) -> Setup:
     """The same of a set-up that is near but for unknowns that it has got since: over all measurements at once."""
-    if given.before is not None:
+    start = _start(given)
+    if start is None:
         return given
+    begun, first, here = start
+    before = np.concatenate([first[:6], given.problem.mean[6:]])
+    here = _fitted(given, begun, here, np.ones(len(given.rows), dtype=np.bool_), scale_of(given, first), before, LONG)
+    return with_prior(given, here.states, _wide(given, here))
+
+
+def _start(given: Setup) -> tuple[float, Array, Place] | None:
+    """When to begin, and with which state and place; None where the orbit was known before, or leads nowhere."""
+    if given.before is not None:
+        return None
     times = given.tracking.times
     begun = float(np.clip(given.guess.epoch - given.measured.epoch, times[0], times[-1]))
     first = _state_at(given, begun)
     here = _place(given, begun, first)
-    if here is None:
-        return given
-    before = np.concatenate([first[:6], given.problem.mean[6:]])
-    here = _fitted(given, begun, here, np.ones(len(given.rows), dtype=np.bool_), scale_of(given, first), before, LONG)
-    return with_prior(given, here.states, _wide(given, here))
+    return None if here is None else (begun, first, here)
 
 
 def _wide(given: Setup, here: Place) -> Array:

@@ -21,7 +21,7 @@ from piazzi.determination.common import with_common_errors
 from piazzi.determination.density import with_density
 from piazzi.determination.earlier import Earlier, earlier_of, fresh
 from piazzi.determination.editing import edited
-from piazzi.determination.faults import CORRELATED, Faults, named
+from piazzi.determination.faults import BEYOND, CORRELATED, Faults, named
 from piazzi.determination.fit import begun, estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
 from piazzi.determination.holding import Held, held, unasked
@@ -50,7 +50,6 @@ from piazzi.problem.checks import Array
 SOURCES = (str, os.PathLike)
 INSTRUMENTS = (BIAS, SCALE, CLOCK)
 _OF_ROWS = "--frame {} names the axes of measurements whose file names none, and so not those of the answer"
-GATE = "beyond the gate"
 ROUNDS = 4  # of the answer, while rows are left out or taken back
 
 
@@ -305,7 +304,7 @@ def _gated(answer: Estimate, keep: Array, reasons: Array) -> tuple[Array, Array]
     if rejected is None or not np.any(rejected):
         return keep, reasons
     own = np.asarray(rejected, dtype=np.bool_) & keep
-    reasons = np.where(own, GATE, reasons)
+    reasons = np.where(own, BEYOND, reasons)
     return keep & ~own, reasons
 
 

@@ -21,7 +21,7 @@ from piazzi.problem.checks import Array
 from piazzi.problem.inputs import prepare, wrapped
 
 OUTLIER, STATION, CLOCK, DUPLICATE, CORRELATED = "outlier", "wrong station", "wrong clock", "duplicate", "correlated"
-MASK, SETTLING = "below the mask", "before the pass settled"
+MASK, SETTLING, BEYOND = "below the mask", "before the pass settled", "beyond the gate"
 SETTLED = 2  # rows at the beginning of a pass that do not fit, before which it is chance
 GOOD = 3.0  # sigma, root mean square, within which a pass fits after all
 BETTER = 3.0  # times, by which it has to fit better

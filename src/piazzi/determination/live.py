@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from piazzi.determination.faults import BEYOND
 from piazzi.determination.fit import kept
 from piazzi.determination.sensing import Measured
 from piazzi.determination.setup import Setup, at_last_used, follow, renewed
@@ -19,8 +20,7 @@ from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
 LATE = "older than what the estimate still holds"
-BEYOND = "beyond the gate"
-OPENED = "beyond the gate, which is open"
+OPENED = f"{BEYOND}, which is open"
 MOST, RECENT = 64, 32  # stations of a problem, of which those that measured last are kept when they become more
 AXES = ("R", "T", "N")
 
