@@ -44,7 +44,7 @@ def test_axes_have_units_and_no_titles(found):
         for ax in (ax for ax in figure.axes if ax.axison):
             assert ax.get_title() == "", name
             assert ax.get_ylabel().endswith("]"), name
-            assert ax.get_xlabel().endswith("]") or "hours past" in ax.get_xlabel(), name
+            assert ax.get_xlabel().endswith("]"), name
 
 
 def test_residuals_are_those_of_the_determination(found):

@@ -153,7 +153,7 @@ def test_a_point_is_picked_by_its_values(open_page, study_page):
 
 def test_the_page_shows_maps_and_spreads(open_page, study_page, grid, stored):
     page = open_page(study_page)
-    figure = page.locator("figure", has_text="NEES: window, delayed")
+    figure = page.locator("figure", has_text="NEES, window, delayed")
     measure = measures(stored.summary)[2]
     values = map_values(grid, ("R.scale", "lag"), measure, ("window", "delayed"), {})
     assert figure.locator(".cells text").all_text_contents() == [measure.text(v) for v in values.ravel()]

@@ -15,7 +15,7 @@ from piazzi.determination.residuals import table
 from piazzi.determination.showing import grids, heading
 from piazzi.evaluate.comparison import Comparison
 from piazzi.evaluate.rows import evaluate
-from piazzi.present.figures.style import time_display, time_label
+from piazzi.present.figures.style import time_display
 from piazzi.present.report import Key, Section, Tab, comparison_tab, write_page
 from piazzi.present.report.blocks import Axis, Point, Table, Text
 from piazzi.present.report.write import page_path
@@ -35,7 +35,7 @@ def tab(found: Any) -> Tab:
     facts, columns, path = document(found), table(found), sampled(found)
     rows = station_rows(found, path)
     times = _times(found, path)
-    time = Axis(time_label(found.setup.measured.epoch), time_display(times))
+    time = Axis("time", time_display(times))
     passes = passes_of(found, columns)
     tone = {False: "bad", True: "good", None: "plain"}
     verdict = sorted(facts["verdict"].items(), key=lambda item: item[1]["ok"] is not False)
@@ -65,6 +65,7 @@ def tab(found: Any) -> Tab:
         times if len(times) > 1 else None,
         time.show,
         switch=len(keys) > 1,
+        epoch=found.setup.measured.epoch,
     )
 
 

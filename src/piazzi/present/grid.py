@@ -124,9 +124,9 @@ class Scale:
         """Ends of the axis, with a margin."""
         low, high = float(self.places.min()), float(self.places.max())
         if self.kind == "log":
-            margin = (high / low) ** 0.04
+            margin = (high / low) ** 0.04 if high > low else 2.0
             return low / margin, high * margin
-        margin = 0.04 * (high - low)
+        margin = 0.04 * (high - low) or 0.5
         return low - margin, high + margin
 
 

@@ -137,9 +137,9 @@ def failures(summary: Summary, most: int = 5) -> list[str]:
 def _rate(line: Line) -> str:
     if line.diverged_interval is None:
         return NOTHING
-    low, high = (100 * x for x in line.diverged_interval)
+    low, high = (f"{100 * x:.2g}" if x < 0.095 else f"{100 * x:.0f}" for x in line.diverged_interval)
     done = line.runs - line.failed
-    return f"{100 * line.diverged / done:.3g} % ({low:.2g}-{high:.2g})"
+    return f"{100 * line.diverged / done:.3g} % ({low}-{high})"
 
 
 def _spread(line: Line, group: str, show: Display) -> str:

@@ -40,10 +40,10 @@ def against(ax: Axes, grid: Grid, axis: str, measure: Measure, at: At) -> Axes:
     An estimator that does not have the setting is a level line.
     """
     scale = Scale.of(grid.axes[axis])
-    names, count = tuple(name for name, _ in grid.estimators), len(grid.estimators)
+    names, count, top = tuple(name for name, _ in grid.estimators), len(grid.estimators), 0.0
     for i, (who, lines) in enumerate(grid.along(axis, at).items()):
         found, style = spreads(measure, lines) * measure.show.factor, line_of(*who, names)
-        mark = "o" if grid.has(who, axis) else ""
+        mark, top = "o" if grid.has(who, axis) else "", max(top, float(np.nanmax(found, initial=0.0)))
         ax.plot(scale.places, found[0], marker=mark, ms=3.5, label=label_of(*who), zorder=3, **style)
         if measure.scale == "linear":
             half = np.abs(found[1:] - found[0])
@@ -61,7 +61,7 @@ def against(ax: Axes, grid: Grid, axis: str, measure: Measure, at: At) -> Axes:
         ax.set_yscale("log")
         plain_ticks(ax)
     else:
-        ax.set_ylim(bottom=0.0)
+        ax.set_ylim(0.0, max(1.05 * top, 1.0, ax.get_ylim()[1] if not ax.get_autoscaley_on() else 0.0))  # of all columns
     ax.set_xlabel(plain(axis))
     ax.set_ylabel(measure.show.label(plain(measure.label)).replace(", ", ",\n", 1))
     return ax

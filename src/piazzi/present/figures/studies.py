@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from piazzi.present.figures.grids import grid_pages
 from piazzi.present.figures.pages import save
 from piazzi.present.figures.style import RC, label_of, line_of, plain, plain_ticks, time_axis
@@ -107,7 +109,7 @@ def cost_page(summary: Summary, lines: list[Line], title: str = "") -> Figure:
     stored = summary.stored
     group = stored.groups[0]
     figure = _figure(7.0, 4.0)
-    ax, names = figure.add_subplot(), tuple(line.estimator for line in lines)
+    ax, names, seen = figure.add_subplot(), tuple(line.estimator for line in lines), []
     for line in lines:
         value = line.over_bound[group] or (line.rmse_last_half[group] if line.over_bound[group] is None else None)
         if value is None or line.seconds is None:
@@ -116,10 +118,16 @@ def cost_page(summary: Summary, lines: list[Line], title: str = "") -> Figure:
         ax.plot(line.seconds * 1e3, value, marker="o" if line.view == "realtime" else "s", linestyle="", color=style["color"])
         text, place = plain(label_of(line.estimator, line.view)), (5, 3 if line.view == "realtime" else -9)
         ax.annotate(text, (line.seconds * 1e3, value), xytext=place, textcoords="offset points", fontsize=7)
+        seen.append((line.seconds * 1e3, value))
     ax.set_xscale("log")
     ax.set_yscale("log")
+    if seen:  # with room for names, and for marks where all lie near together
+        low, high = np.min(seen, axis=0), np.max(seen, axis=0)
+        wider = np.maximum(10.0 / (high / low), 1.0) ** 0.5 * (high / low) ** 0.08
+        ax.set_xlim(low[0] / wider[0], high[0] * wider[0] * (high[0] / low[0]) ** 0.1)
+        ax.set_ylim(low[1] / wider[1], high[1] * wider[1])
     plain_ticks(ax)
-    ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    plain_ticks(ax, "x")
     ax.set_xlabel("time of one run [ms]")
     ax.set_ylabel(plain(f"{printable(group)} RMSE, last half, over its bound"))
     _title(figure, summary, lines, title, "circles, real time; squares, delayed")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -63,16 +63,14 @@ def drawn(count: int) -> slice:
     return slice(None, None, max(1, -(-count // MOST_POINTS)))
 
 
-def time_label(epoch: Epoch | None) -> str:
-    """What the axis of time is called."""
-    return "time" if epoch is None else f"time past {epoch.to('TT', digits=3)}"
-
-
 def time_axis(ax: Axes, times: Array, epoch: Epoch | None = None) -> Display:
-    """Label and limit the axis of time, which is past an instant where there is one; returns its unit."""
+    """Label and limit the axis of time, which has dates where there is an instant to count from; returns its unit."""
     show = time_display(times)
-    words = {"h": "hours", "min": "minutes", "s": "seconds"}[show.unit or "s"]
-    ax.set_xlabel(show.label("time") if epoch is None else time_label(epoch).replace("time", words))
+    ax.set_xlabel(show.label("time"))
+    if epoch is not None:
+        from piazzi.present.figures.dated import date_axis
+
+        date_axis(ax, epoch, show.factor)
     if len(times) > 1:
         margin = 0.01 * (times[-1] - times[0])
         ax.set_xlim((times[0] - margin) * show.factor, (times[-1] + margin) * show.factor)
@@ -103,12 +101,13 @@ def _logarithmic(ax: Axes, threshold: float, largest: float) -> None:
     plain_ticks(ax)
 
 
-def plain_ticks(ax: Axes) -> None:
+def plain_ticks(ax: Axes, which: Literal["x", "y"] = "y") -> None:
     """Numbers such as 0.01 and 1000 on a logarithmic axis; 2 and 5 between them where it is less than two decades long."""
+    axis = ax.xaxis if which == "x" else ax.yaxis
 
     def between(value: float, _: float) -> str:
-        low, high = ax.get_ylim()
+        low, high = sorted(axis.get_view_interval())
         return f"{value:g}" if high < 100 * low and f"{value:.0e}"[0] in "25" else ""
 
-    ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    ax.yaxis.set_minor_formatter(between)
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_formatter(between)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from piazzi.evaluate.quantities import Display
 from piazzi.problem.checks import Array
+
+if TYPE_CHECKING:
+    from piazzi.earth import Epoch
 
 Scale = Literal["linear", "log", "symmetric"]
 Tone = Literal["good", "bad", "plain"]
@@ -262,6 +265,8 @@ class Section:
 class Tab:
     """One problem, or one study: a summary first, then sections.  With `times` (K,) it has a cursor and can be played.
 
+    Charts over time have dates where times are past an `epoch`.
+
     Where it is not to `switch`, its keys are not offered to be switched.  Tabs with values of what was varied, `at`,
     are picked by them, beside those without.
     """
@@ -275,3 +280,4 @@ class Tab:
     show_time: Display = field(default_factory=lambda: Display("s"))
     switch: bool = True
     at: Sequence[tuple[str, str]] = ()
+    epoch: Epoch | None = None

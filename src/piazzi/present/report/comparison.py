@@ -14,6 +14,7 @@ from piazzi.present.report.paths import orbits
 from piazzi.present.report.views import Views
 from piazzi.present.report.words import points
 from piazzi.present.tables import summary
+from piazzi.problem import epoch_of
 
 _PLAY = "Dots and 3-sigma ellipses are where the cursor is: play, drag the slider, or click on any chart over time."
 _UNKNOWN = "The truth is not known, so errors are not shown; what the covariances expect of them is."
@@ -55,6 +56,7 @@ def comparison_tab(
         keys=views.keys,
         times=views.times if views.found else None,
         show_time=time_display(comparison.tracking.times),
+        epoch=epoch_of(comparison.problem, comparison.tracking),
     )
 
 

@@ -22,6 +22,11 @@ def text(words: str) -> str:
     return escape(printable(words))
 
 
+def lines(words: str) -> str:
+    """Lines as HTML, where they end as they were written; other control characters are written out."""
+    return "\n".join(map(text, words.splitlines()))
+
+
 def tab_chooser(tabs: Sequence[Tab]) -> str:
     """A button for every tab; those with values of what was varied share one, and a list of values for each number."""
     if any(tab.at for tab in tabs):

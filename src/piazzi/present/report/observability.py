@@ -7,7 +7,7 @@ import numpy as np
 from piazzi.evaluate.observable import Observability
 from piazzi.evaluate.quantities import Display
 from piazzi.present.colours import STATIONS
-from piazzi.present.figures.style import time_display, time_label
+from piazzi.present.figures.style import time_display
 from piazzi.present.report.blocks import Axis, Chart, Line, Point, Section, Tab, Text, Tone
 from piazzi.present.report.windows import table_of
 from piazzi.present.tables import summary
@@ -31,6 +31,7 @@ def observability_tab(found: Observability, *, title: str = "") -> Tab:
         [observability_section(found, words=False)],
         times=found.growth_times,
         show_time=time_display(found.growth_times),
+        epoch=epoch_of(found.problem, found.tracking),
     )
 
 
@@ -83,7 +84,7 @@ def _sigmas(found: Observability) -> Chart:
 
 
 def _time(found: Observability) -> Axis:
-    return Axis(time_label(epoch_of(found.problem, found.tracking)), time_display(found.growth_times))
+    return Axis("time", time_display(found.growth_times))
 
 
 def _limits(lines: list[Line], mark: float) -> tuple[float, float]:

@@ -26,11 +26,12 @@ from piazzi.present.report.blocks import (
     World,
 )
 from piazzi.present.report.html import Pool, line_mark, script_json, text
-from piazzi.present.report.places import axis_data, display_data, heat_data, noted, sky_data, world_data
+from piazzi.present.report.places import axis_data, calendar_data, display_data, heat_data, noted, sky_data, world_data
 from piazzi.text import printable
 
 SCRIPTS = (
     "data.js",
+    "calendar.js",
     "scales.js",
     "chart.js",
     "orbit.js",
@@ -127,6 +128,7 @@ class _Builder:
             "keys": [{"label": printable(k.label), "colour": k.colour, "dash": list(k.dash)} for k in tab.keys],
             "times": None if tab.times is None else self.pool.add_exactly(tab.times),
             "show": display_data(tab.show_time),
+            "calendar": calendar_data(tab),
             "drawings": self.drawings,
             "at": [[printable(name), printable(value)] for name, value in tab.at],
         }
@@ -190,7 +192,7 @@ class _Builder:
             case Sky():
                 return self._drawing(block.title, block.note, sky_data(block, self.pool))
             case Code():
-                return f'<div class="panel full"><pre tabindex="0">{text(block.text)}</pre></div>'
+                return f'<div class="panel full"><pre tabindex="0">{html.lines(block.text)}</pre></div>'
             case Text():
                 return '<div class="panel full">' + "".join(f"<p>{text(p)}</p>" for p in block.paragraphs) + "</div>"
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.evaluate.quantities import Display
-from piazzi.present.report.blocks import Axis, Heat, Rows, Sky, World
+from piazzi.present.report.blocks import Axis, Heat, Rows, Sky, Tab, World
 from piazzi.present.report.html import Pool
 from piazzi.problem.checks import Array
 from piazzi.text import printable
@@ -74,6 +74,15 @@ def _wrapped(angle: Array) -> Array:
 def display_data(show: Display) -> list[Any]:
     """A unit and its factor."""
     return [printable(show.unit), show.factor]
+
+
+def calendar_data(tab: Tab) -> dict[str, Any] | None:
+    """The clock beside the times of a tab, None where they are past no instant."""
+    if tab.epoch is None:
+        return None
+    from piazzi.present.dates import Calendar
+
+    return Calendar(tab.epoch).to_dict(np.zeros(1) if tab.times is None else tab.times)
 
 
 def axis_data(axis: Axis) -> Mapping[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from piazzi.evaluate.quantities import Display, number
 from piazzi.present.colours import dash_of, label_of, shades
-from piazzi.present.figures.style import time_display, time_label
+from piazzi.present.figures.style import time_display
 from piazzi.present.grid import value_text
 from piazzi.present.report.blocks import Axis, Chart, Key, Line, Point, Section, Tab, Table, Text
 from piazzi.present.report.study_grid import grid_keys, sections_along, sections_of_maps
@@ -70,7 +70,7 @@ def _tab(summary: Summary, index: int, name: str, grid: Grid | None = None) -> T
         for line in lines
     ]
     show = time_display(stored.times)
-    axis = Axis(time_label(stored.epoch), show, low=float(stored.times[0]), high=float(stored.times[-1]))
+    axis = Axis("time", show, low=float(stored.times[0]), high=float(stored.times[-1]))
     charts = [chart for i, group in enumerate(stored.groups) for chart in _errors(summary, lines, keys, axis, i, group)]
     return Tab(
         point_name(at) or name,
@@ -85,6 +85,7 @@ def _tab(summary: Summary, index: int, name: str, grid: Grid | None = None) -> T
         keys=keys,
         times=stored.times,
         show_time=show,
+        epoch=stored.epoch,
         at=[(axis, value_text(at[axis])) for axis in at] if grid is not None else (),
     )
 

@@ -88,7 +88,7 @@ def _maps(grid: Grid, pair: tuple[str, str], measure: Measure, who: Sequence[Who
         for row, shares_of_row in zip(v.tolist(), share.tolist(), strict=True):
             shown = [(colour(measure, s), measure.text(value)) for value, s in zip(row, shares_of_row, strict=True)]
             cells.append([(shade, letters(shade), text) for shade, text in shown])
-        title = f"{measure.heading}: {label_of(*one)}"
+        title = f"{measure.show.label(measure.heading)}, {label_of(*one)}"
         out.append(
             Heat(title, (printable(pair[0]), printable(pair[1])), (across, up), measure.show.label(measure.label), cells)
         )

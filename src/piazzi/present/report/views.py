@@ -13,9 +13,8 @@ from piazzi.evaluate.consistency_tests import LONGEST
 from piazzi.evaluate.metrics import known_truth
 from piazzi.evaluate.quantities import Display
 from piazzi.present.colours import dash_of, label_of, shades
-from piazzi.present.figures.style import time_display, time_label
+from piazzi.present.figures.style import time_display
 from piazzi.present.report.blocks import Axis, Key
-from piazzi.problem import epoch_of
 from piazzi.problem.checks import Array
 
 MOST_POINTS = 1500
@@ -61,7 +60,7 @@ class Views:
     @property
     def axis(self) -> Axis:
         """The axis of time."""
-        return Axis(time_label(epoch_of(self.comparison.problem, self.comparison.tracking)), self.show_time)
+        return Axis("time", self.show_time)
 
     @property
     def estimates(self) -> list[Estimate]:

@@ -62,13 +62,14 @@ class Chart {
     this.width = width;
     const height = (this.height = Math.round(Math.min(300, Math.max(210, width * 0.46))));
     const { x, y } = this.limits();
-    this.sy = scaleOf(this.yAxis, ...y, height - 38, 26);
+    const foot = this.calendar ? 51 : 38; // the day stands below the hour
+    this.sy = scaleOf(this.yAxis, ...y, height - foot, 26);
     const marks = ticks(this.sy, 34);
     const texts = marks.map((v) => tickText(v));
     const left = 14 + 7 * Math.max(3, ...texts.map((t) => t.length));
     this.sx = scaleOf(this.xAxis, ...x, left, width - 12);
     const id = `clip-${this.tab.id}-${this.box.dataset.drawing}`;
-    const [top, bottom, right] = [26, height - 38, width - 12];
+    const [top, bottom, right] = [26, height - foot, width - 12];
     const svg = element("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": this.described() });
     svg.append(element("defs", {}, element("clipPath", { id }, element("rect", { x: left, y: top - 1, width: right - left, height: bottom - top + 2 }))));
     const grid = element("g", { class: "grid-lines" });
@@ -78,18 +79,19 @@ class Chart {
       grid.append(element("text", { x: left - 6, y: at + 4, "text-anchor": "end" }, texts[i]));
     });
     let free = -Infinity;
-    for (const [v, text] of this.spec.x.marks.length ? this.spec.x.marks.map(([v, words]) => [v * this.spec.x.show[1], words]) : ticks(this.sx, 70).map((v) => [v, tickText(v)])) {
+    for (const [v, text, below] of this.marked()) {
       const at = this.sx.place(v);
       grid.append(element("line", { x1: at, x2: at, y1: bottom, y2: bottom + 4, class: "tick" }));
       const middle = inward(at, text, width);
       if (middle - 3.6 * text.length < free) continue;
       free = middle + 3.6 * text.length + 4;
       grid.append(element("text", { x: middle, y: bottom + 17, "text-anchor": "middle" }, text));
+      if (below) grid.append(element("text", { x: inward(at, below, width), y: bottom + 30, "text-anchor": "middle" }, below));
     }
     grid.append(element("line", { x1: left, x2: right, y1: bottom, y2: bottom, class: "axis" }));
     svg.append(grid);
     svg.append(element("text", { x: 2, y: 13, class: "label" }, labelled(this.spec.y)));
-    svg.append(element("text", { x: right, y: height - 4, "text-anchor": "end", class: "label" }, labelled(this.spec.x)));
+    svg.append(element("text", { x: right, y: height - 4, "text-anchor": "end", class: "label" }, this.xLabel()));
     this.inside = element("g", { "clip-path": `url(#${id})` });
     svg.append(this.inside);
     this.stretches(top, bottom);
@@ -106,6 +108,25 @@ class Chart {
     this.svg = svg;
     this.refresh();
     this.move();
+  }
+
+  get calendar() {
+    return this.spec.time ? this.tab.calendar : null;
+  }
+
+  xLabel() {
+    return this.calendar ? this.calendar.label : labelled(this.spec.x);
+  }
+
+  // Marks of the horizontal axis with their words, and what stands below these.
+  marked() {
+    const f = this.spec.x.show[1];
+    if (this.calendar) {
+      const most = Math.floor((this.sx.to - this.sx.from) / 80);
+      return this.calendar.ticks(this.sx.low / f, this.sx.high / f, most).map(({ t, text, below }) => [t * f, text, below]);
+    }
+    if (this.spec.x.marks.length) return this.spec.x.marks.map(([v, words]) => [v * f, words]);
+    return ticks(this.sx, 70).map((v) => [v, tickText(v)]);
   }
 
   stretches(top, bottom) {
@@ -265,10 +286,13 @@ class Chart {
 
   table() {
     const [xs, ys] = [this.spec.x, this.spec.y].map((axis) => labelled(axis));
-    const rows = [["series", xs, ys, "note"]];
-    for (const line of this.lines)
-      line.x.forEach((x, i) => Number.isNaN(line.y[i]) || rows.push([line.name === line.label ? line.name : `${line.name}: ${line.label}`, x, line.y[i], line.notes ? line.notes.words[line.notes.of[i]] : ""]));
-    for (const line of this.lines.filter((l) => l.kind === "spread")) line.x.forEach((x, i) => Number.isNaN(line.lower[i]) || rows.push([`${line.name}: ${line.label}, lower end`, x, line.lower[i], ""]));
+    const rows = [["series", ...(this.spec.time ? this.tab.timeHeads : [xs]), ys, "note"]];
+    const at = (line, i) => (this.spec.time ? this.tab.timeCells(line.seconds[i]) : [line.x[i]]);
+    for (const line of this.lines) {
+      const name = line.name === line.label ? line.name : `${line.name}: ${line.label}`;
+      line.y.forEach((y, i) => Number.isNaN(y) || rows.push([name, ...at(line, i), y, line.notes ? line.notes.words[line.notes.of[i]] : ""]));
+      if (line.kind === "spread") line.lower.forEach((y, i) => Number.isNaN(y) || rows.push([`${name}, lower end`, ...at(line, i), y, ""]));
+    }
     return rows;
   }
 
@@ -279,7 +303,7 @@ class Chart {
 
   described() {
     const names = [...new Set(this.lines.map((l) => l.name))].join(", ");
-    return `${this.spec.title}: ${labelled(this.spec.y)} against ${labelled(this.spec.x)}; ${names}`;
+    return `${this.spec.title}: ${labelled(this.spec.y)} against ${this.xLabel()}; ${names}`;
   }
 
   xUnder(event) {
@@ -322,7 +346,8 @@ class Chart {
       value: withUnit((line.kind === "band" ? "±" : "") + number(value), unit) + (note ? `, ${note}` : ""),
     }));
     const mark = this.spec.x.marks.find(([v]) => v * this.spec.x.show[1] === found[0].x);
-    showTip(event, `${this.spec.time ? "" : `${this.spec.x.label} `}${mark ? mark[1] : withUnit(number(found[0].x), xUnit)}`, rows);
+    const where = this.spec.time ? this.tab.when(found[0].x / this.spec.x.show[1], 4) : `${this.spec.x.label} ${mark ? mark[1] : withUnit(number(found[0].x), xUnit)}`;
+    showTip(event, where, rows);
   }
 
   release(event) {

@@ -183,8 +183,8 @@ class Orbit {
 
   table() {
     const [x, y] = this.spec.labels.map((label) => labelled({ label, show: this.spec.show }));
-    const rows = [["series", `time [s]`, x, y]];
-    for (const t of this.tracks) t.x.forEach((v, i) => rows.push([t.label, this.tab.times[i], v, t.y[i]]));
+    const rows = [["series", ...this.tab.timeHeads, x, y]];
+    for (const t of this.tracks) t.x.forEach((v, i) => rows.push([t.label, ...this.tab.timeCells(this.tab.times[i]), v, t.y[i]]));
     return rows;
   }
 

@@ -76,14 +76,14 @@ class Sky {
     });
     if (best < 0) return hideTip();
     const turned = (v) => `${number((v * 180) / Math.PI, 4)}°`;
-    const when = withUnit(number(this.row.seconds[best] * this.tab.show[1], 5), this.tab.show[0]);
+    const when = this.tab.when(this.row.seconds[best]);
     const place = { colour: this.row.colour, name: "azimuth, elevation", value: `${turned(this.azimuth[best])}, ${turned(this.elevation[best])}` };
     showTip(event, when, [place, ...this.row.tip(best)]);
   }
 
   table() {
-    const rows = [["series", "time [s]", "azimuth [deg]", "elevation [deg]", "used", "note"]];
-    this.points.forEach((p, i) => p && rows.push([this.row.label, this.row.seconds[i], ...[this.azimuth[i], this.elevation[i]].map((v) => (v * 180) / Math.PI), this.row.used[i], this.row.note(i)]));
+    const rows = [["series", ...this.tab.timeHeads, "azimuth [deg]", "elevation [deg]", "used", "note"]];
+    this.points.forEach((p, i) => p && rows.push([this.row.label, ...this.tab.timeCells(this.row.seconds[i]), ...[this.azimuth[i], this.elevation[i]].map((v) => (v * 180) / Math.PI), this.row.used[i], this.row.note(i)]));
     return rows;
   }
 }

@@ -6,6 +6,7 @@ class Tab {
     this.root = document.getElementById(spec.id);
     this.keys = spec.keys;
     this.show = spec.show;
+    this.calendar = spec.calendar && new Calendar(spec.calendar);
     this.visible = new Set(spec.keys.keys());
     this.focus = 0;
     this.times = spec.times === null ? new Float64Array([0]) : array(spec.times);
@@ -102,7 +103,22 @@ class Tab {
   }
 
   clock() {
-    return withUnit(number(this.time * this.show[1]), this.show[0]);
+    return this.when(this.time, 4);
+  }
+
+  // A time of the run, as a date where there are dates.
+  when(seconds, digits = 5) {
+    if (this.calendar) return this.calendar.text(seconds, this.span[1] - this.span[0]);
+    return withUnit(number(seconds * this.show[1], digits), this.show[0]);
+  }
+
+  // Heads of the columns of time in a table, and what stands in them.
+  get timeHeads() {
+    return this.calendar ? [this.calendar.label, "time [s]"] : ["time [s]"];
+  }
+
+  timeCells(seconds) {
+    return this.calendar ? [this.calendar.stamp(seconds), seconds] : [seconds];
   }
 
   zoomTo(range) {

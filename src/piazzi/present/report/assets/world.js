@@ -60,10 +60,6 @@ class World {
     showTip(event, best.title, best.lines);
   }
 
-  when(seconds) {
-    return withUnit(number(seconds * this.tab.show[1], 5), this.tab.show[0]);
-  }
-
   // Stations, measurements and samples with where they are on paper; a smaller rank wins.
   spots() {
     const out = [];
@@ -74,21 +70,21 @@ class World {
       }
       row.place.forEach((p, i) => {
         const at = Number.isNaN(p[0]) ? null : this.onPaper(p, row.turned[i]);
-        if (at) out.push({ x: at[0], y: at[1], rank: row.used[i] ? -3 : -4, title: this.when(row.seconds[i]), lines: row.tip(i) });
+        if (at) out.push({ x: at[0], y: at[1], rank: row.used[i] ? -3 : -4, title: this.tab.when(row.seconds[i]), lines: row.tip(i) });
       });
     }
     this.place.forEach((p, i) => {
       const at = this.onPaper(p, this.turned[i]);
       const height = withUnit(number((Math.hypot(...p) - RADIUS) / 1000), "km");
-      if (at) out.push({ x: at[0], y: at[1], rank: 0, title: this.when(this.seconds[i]), lines: [{ colour: "var(--ink)", name: degrees(p), value: `${height} up` }] });
+      if (at) out.push({ x: at[0], y: at[1], rank: 0, title: this.tab.when(this.seconds[i]), lines: [{ colour: "var(--ink)", name: degrees(p), value: `${height} up` }] });
     });
     return out;
   }
 
   table() {
-    const rows = [["series", `time [s]`, "x [m]", "y [m]", "z [m]", "note"]];
-    this.place.forEach((p, i) => rows.push(["orbit, fixed to the Earth", this.seconds[i], ...p, ""]));
-    for (const row of this.rows) row.place.forEach((p, i) => Number.isNaN(p[0]) || rows.push([row.label, row.seconds[i], ...p, row.note(i)]));
+    const rows = [["series", ...this.tab.timeHeads, "x [m]", "y [m]", "z [m]", "note"]];
+    this.place.forEach((p, i) => rows.push(["orbit, fixed to the Earth", ...this.tab.timeCells(this.seconds[i]), ...p, ""]));
+    for (const row of this.rows) row.place.forEach((p, i) => Number.isNaN(p[0]) || rows.push([row.label, ...this.tab.timeCells(row.seconds[i]), ...p, row.note(i)]));
     return rows;
   }
 }
