@@ -1,6 +1,7 @@
 """Axes of time with dates: marks at round readings of the clock, the same in pictures and on pages."""
 
 from datetime import datetime
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ def test_marks_are_where_the_clock_shows_what_they_say(begin, span):
     marks = calendar.ticks(0.0, span, 6)
     assert calendar.scale == begin.split()[-1] and calendar.label == f"time [{calendar.scale}]"
     assert 2 <= len(marks) <= 8 and all(-1e-3 <= m.t <= span + 1e-3 for m in marks)
-    assert all(a.t < b.t for a, b in zip(marks, marks[1:], strict=False))
+    assert all(a.t < b.t for a, b in pairwise(marks))
     day = ""
     for mark in marks:
         date = (Epoch(begin) + mark.t).to(calendar.scale, digits=3).split()[0]
@@ -78,7 +79,7 @@ def test_pages_mark_what_pictures_mark(open_page, tmp_path, begin):
 
 
 def test_code_keeps_its_lines(open_page, tmp_path):
-    words = "[states]\n# <b>what</b> moves\nx = \"length\"\x1b[31m"
+    words = '[states]\n# <b>what</b> moves\nx = "length"\x1b[31m'
     tab = Tab("Code", "", [], [Section("Made", [Code(words)])])
     page = open_page(write_page(tmp_path / "p.html", "Code", [tab]))
     assert page.locator("pre").inner_text().splitlines() == words.replace("\x1b", "\\x1b").splitlines()

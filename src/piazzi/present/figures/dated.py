@@ -24,7 +24,7 @@ class _Round(Locator):
         return self.tick_values(*sorted(self.axis.get_view_interval()))
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
-        axes: Any = self.axis.axes if self.axis is not None else None
+        axes: Any = getattr(self.axis, "axes", None)
         wide = 5.0 if axes is None else axes.get_position().width * axes.get_figure(root=True).get_size_inches()[0]
         marks = self._calendar.ticks(vmin / self._factor, vmax / self._factor, max(2, int(wide / _ROOM)))
         self._words.seq = [f"{mark.text}\n{mark.below}" if mark.below else mark.text for mark in marks]
