@@ -132,6 +132,14 @@ def test_what_cannot_be_written_is_said(data_dir):
         tdm_text(rows)
 
 
+@pytest.mark.parametrize("name", ["A\x9dB", "A\nB", "\x1b[31mA"])
+def test_a_name_with_control_characters_stays_on_the_line_of_its_message(name, data_dir):
+    arc = pz.read_ephemeris(data_dir / "ccsds/odm/oem/OEMExample5.txt").arcs[0]
+    with pytest.raises(ValueError, match="positions and velocities") as told:
+        oem_text(pz.Ephemeris(arcs=(replace(arc, name=name, velocity=np.array(np.nan)),)))
+    assert str(told.value).isprintable()
+
+
 def test_tracking_of_other_origin_gets_segments_that_the_format_can_say(tmp_path):
     segments = (Segment("UTC", way="two-way", tag="bounce"), Segment("TT", way="one-way", frame="GCRF", interval=10.0))
     rows = Observations(

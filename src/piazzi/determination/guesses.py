@@ -186,13 +186,13 @@ def _of_orbit(orbit: Any, near: Epoch, chosen: str | None, path: str, about: str
         return _of_mean(min(mean, key=lambda m: abs(m.epoch - near)), near, path)
     arc = min(arcs, key=lambda one: _away(one, near))
     if arc.centre not in (None, about.upper()):
-        raise ValueError(f"{path}: positions of {arc.name or 'the object'} are about {arc.centre}, not the {about.title()}")
+        raise ValueError(f"{path}: positions of {arc.called} are about {arc.centre}, not the {about.title()}")
     if arc.frame is None:
         raise ValueError(f"{path}: the file does not say in which axes its positions are")
     kept = np.isfinite(arc.position).all(axis=1)
     t, order = np.unique(arc.t[kept], return_index=True)
     if not len(t):
-        raise ValueError(f"{path}: there is no position of {arc.name or 'the object'} in it")
+        raise ValueError(f"{path}: there is no position of {arc.called} in it")
     at = float(np.clip(near - arc.epoch, t[0], t[-1]))
     r, v = arc.position[kept][order], arc.velocity[kept][order]
     known = bool(np.isfinite(v).all())

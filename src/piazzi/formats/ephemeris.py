@@ -9,7 +9,7 @@ import numpy as np
 
 from piazzi.earth import Epoch
 from piazzi.formats.copying import reduced
-from piazzi.text import brief
+from piazzi.text import brief, one_line
 
 Array = np.ndarray[Any, Any]
 
@@ -78,6 +78,11 @@ class Arc:
 
     __repr__ = brief
 
+    @property
+    def called(self) -> str:
+        """What messages call it: its name, on one printable line, or the object."""
+        return one_line(self.name) or "the object"
+
     def __post_init__(self) -> None:
         put, count = object.__setattr__, len(np.atleast_1d(self.t))
         shapes: dict[str, tuple[int, ...]] = dict.fromkeys(("t", "clock", "clock_rate", "lines"), (count,))
@@ -135,6 +140,11 @@ class MeanElements:
     said: tuple[tuple[str, str], ...] = ()
 
     __repr__ = brief
+
+    @property
+    def called(self) -> str:
+        """What messages call it: its name, on one printable line, or the object."""
+        return one_line(self.name) or "the object"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -134,7 +134,7 @@ def tle_text(mean: MeanElements) -> str:
     """
     values, said = dict(mean.elements), dict(mean.said)
     if "mean_motion" not in values:
-        raise ValueError(f"mean elements of {mean.name or 'the object'} have no mean motion, which two-line elements hold")
+        raise ValueError(f"mean elements of {mean.called} have no mean motion, which two-line elements hold")
     _, day, seconds, fraction = mean.epoch.reading("UTC")
     year, since = _year_and_day(day)
     number = said.get("NORAD_CAT_ID", "").rjust(5, "0")[:5]
@@ -154,7 +154,7 @@ def tle_text(mean: MeanElements) -> str:
     )
     for line in (first, second):
         if len(line) != LENGTH - 1:
-            raise ValueError(f"mean elements of {mean.name or 'the object'} do not fit into two-line elements: {line}")
+            raise ValueError(f"mean elements of {mean.called} do not fit into two-line elements: {line}")
     lines = [f"{line}{sum(int(c) if c.isdigit() else c == '-' for c in line) % 10}" for line in (first, second)]
     return "\n".join([*([mean.name] if mean.name else []), *lines]) + "\n"
 

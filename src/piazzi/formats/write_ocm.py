@@ -45,9 +45,9 @@ def ocm_text(
     """
     for what, value in (("centre", arc.centre), ("axes", arc.frame), ("time scale", arc.scale)):
         if not plain(value or ""):
-            raise ValueError(f"the {what} of {arc.name or 'the object'} must be known to write it")
+            raise ValueError(f"the {what} of {arc.called} must be known to write it")
     if np.isnan(arc.position).any() or np.isnan(arc.velocity).any():
-        raise ValueError(f"states of {arc.name or 'the object'} must all have positions and velocities to write them")
+        raise ValueError(f"states of {arc.called} must all have positions and velocities to write them")
     lines = ["CCSDS_OCM_VERS = 3.0", f"CREATION_DATE = {created or now()}", f"ORIGINATOR = {plain(originator)}", ""]
     lines += ["META_START", f"OBJECT_NAME = {plain(arc.name) or 'UNKNOWN'}"]
     lines += [f"INTERNATIONAL_DESIGNATOR = {plain(arc.identifier) or 'UNKNOWN'}", f"TIME_SYSTEM = {arc.scale}"]

@@ -38,7 +38,7 @@ def _header(form: str, originator: str, created: str | None) -> list[str]:
 def _metadata(arc: Arc | MeanElements) -> Iterator[str]:
     for what, value in (("centre", arc.centre), ("axes", arc.frame), ("time scale", arc.scale)):
         if not plain(value or ""):
-            raise ValueError(f"the {what} of {arc.name or 'the object'} must be known to write it")
+            raise ValueError(f"the {what} of {arc.called} must be known to write it")
     yield f"OBJECT_NAME = {plain(arc.name) or 'UNKNOWN'}"
     yield f"OBJECT_ID = {plain(arc.identifier) or 'UNKNOWN'}"
     yield f"CENTER_NAME = {plain(arc.centre or '')}"
@@ -63,7 +63,7 @@ def _span(arc: Arc) -> Iterator[str]:
 
 def _states(arc: Arc) -> Iterator[str]:
     if np.isnan(arc.position).any() or np.isnan(arc.velocity).any():
-        raise ValueError(f"states of {arc.name or 'the object'} must all have positions and velocities to write them")
+        raise ValueError(f"states of {arc.called} must all have positions and velocities to write them")
     table = in_unit(np.hstack([arc.position, arc.velocity, arc.acceleration]), 1e3)
     for when, row in zip(dates(arc.scale or "", arc.epoch, arc.t), table.tolist(), strict=True):
         numbers = row if row[6] == row[6] and row[7] == row[7] and row[8] == row[8] else row[:6]
@@ -88,7 +88,7 @@ def opm_text(arc: Arc, *, originator: str = "PIAZZI", created: str | None = None
     scale = arc.scale or ""
     state = in_unit(np.concatenate([arc.position[0], arc.velocity[0]]), 1e3)
     if np.isnan(state).any():
-        raise ValueError(f"the state of {arc.name or 'the object'} must have position and velocity to write it")
+        raise ValueError(f"the state of {arc.called} must have position and velocity to write it")
     lines.append(f"EPOCH = {dates(scale, arc.epoch, arc.t)[0]}")
     lines += [f"{keyword} = {number(value)}" for keyword, value in zip(STATE, state.tolist(), strict=True)]
     lines += [*_quantities(arc.elements, ELEMENTS), *_quantities(arc.spacecraft, SPACECRAFT)]

@@ -73,7 +73,7 @@ def sgp4_states(mean: MeanElements, epochs: Epoch | Sequence[Epoch], frame: str 
     if np.any(fault):
         k = int(np.argmax(fault != 0))
         reason = _FAULTS.get(int(fault[k]), f"fault {fault[k]}")
-        raise ValueError(f"SGP4 has no state of {mean.name or 'the object'} at {dates[k]}: {reason}")
+        raise ValueError(f"SGP4 has no state of {mean.called} at {dates[k]}: {reason}")
     r, v = 1e3 * r, 1e3 * v
     if frame.strip().upper() != "TEME":
         r, turned = transform(r, v, "TEME", frame, dates)
@@ -132,10 +132,10 @@ def _satellite(mean: MeanElements) -> Any:
     from sgp4.api import WGS72, Satrec
 
     if mean.theory.upper().replace("/", "").replace(" ", "") not in ("SGP4", "SGPSGP4", "SDP4", "SGP4SDP4"):
-        raise ValueError(f"mean elements of {mean.name or 'the object'} are of the theory {mean.theory}; SGP4 is known")
+        raise ValueError(f"mean elements of {mean.called} are of the theory {mean.theory}; SGP4 is known")
     values, said = dict(mean.elements), dict(mean.said)
     if "mean_motion" not in values:
-        raise ValueError(f"mean elements of {mean.name or 'the object'} have no mean motion, which SGP4 needs")
+        raise ValueError(f"mean elements of {mean.called} have no mean motion, which SGP4 needs")
     jd, part = mean.epoch.jd("UTC")
     satellite = Satrec()
     satellite.sgp4init(

@@ -220,7 +220,7 @@ def first_date(what: Any) -> Epoch | None:
 
 def _nodes(arc: Arc, zero: Epoch) -> tuple[Array, Array, Array | None]:
     """Times past `zero`, positions and velocities in the GCRF of the rows that have a position."""
-    who = arc.name or "the object"
+    who = arc.called
     if arc.frame is None:
         raise ValueError(f"the file does not say in which axes positions of {who} are")
     if arc.centre not in (None, "EARTH") or arc.frame_epoch is not None:
