@@ -119,7 +119,7 @@ def test_unknown_scenarios_are_refused(call):
 
 @pytest.mark.slow  # a dozen kernels
 def test_demo_writes_what_it_says(call, tmp_path):
-    result = call("demo", "-o", tmp_path / "demo")
+    result = call("demo", "-o", tmp_path / "demo", "--title", "A first look")
     assert result.status == 0
     made = sorted(str(p.relative_to(tmp_path / "demo")) for p in (tmp_path / "demo").glob("*/*"))
     kinds = [
@@ -134,7 +134,8 @@ def test_demo_writes_what_it_says(call, tmp_path):
     assert made == [f"{p}/{k}" for p in ("b612-range", "gps-position", "satellite-bearing") for k in kinds]
     assert "Wrote 22 files" in result.out
     assert f"Open {tmp_path / 'demo' / 'report.html'} in a browser" in result.out
-    assert (tmp_path / "demo" / "report.html").read_text().startswith("<!DOCTYPE html>")
+    page = (tmp_path / "demo" / "report.html").read_text()
+    assert page.startswith("<!DOCTYPE html>") and "<title>A first look</title>" in page
     for name in ("b612-range", "gps-position", "satellite-bearing"):
         document = json.loads((tmp_path / "demo" / name / "comparison.json").read_text())
         assert document["schema"] == "piazzi.compare/1"

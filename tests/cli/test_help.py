@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -47,9 +48,20 @@ def test_commands_stand_by_what_people_want(call):
     ("typed", "offered"),
     [
         ("piazzi det", ["plain,determine"]),
-        ("piazzi compare b612", ["plain,b612-range", "plain,b612-range-q0", "file,b612"]),
+        ("piazzi compare b612", ["file,b612", "plain,b612-range", "plain,b612-range-q0"]),
         ("piazzi compare x --with sm", ["plain,smoother"]),
         ("piazzi determine x --agai", ["plain,--against"]),
+        ("piazzi determine ceres", ["file,ceres", "plain,ceres-1801"]),
+        ("piazzi orbits pass", ["file,pass"]),
+        ("piazzi tracking x --to y", ["file,y"]),
+        ("piazzi study leo", ["file,leo", "plain,leo-radar"]),
+        ("piazzi scenarios show gto", ["file,gto", "plain,gto-radar"]),
+        ("piazzi scenarios check my", ["file,my"]),
+        ("piazzi report x -o pa", ["file,pa"]),
+        ("piazzi compare x --report ou", ["dir,ou"]),
+        ("piazzi determine x --stations il", ["file,il", "plain,ilrs"]),
+        ("piazzi compare x --scenario sun", ["file,sun", "plain,sun-sync-day"]),
+        ("piazzi difference a b", ["file,b"]),
     ],
 )
 def test_shells_complete_what_is_typed(typed, offered):
@@ -58,6 +70,21 @@ def test_shells_complete_what_is_typed(typed, offered):
     program = [sys.executable, "-P", "-c", MAIN]
     done = subprocess.run(program, env=os.environ | words, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == offered
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"), [("determine la", "lageos-2"), ("compare b612-range-", "b612-range-q0"), ("determine pa", "")]
+)
+def test_the_script_for_bash_offers_words_and_leaves_files_to_the_shell(typed, offered):
+    script = f"""compopt() {{ echo "files: $1 $2" >&2; }}
+eval "$(_PIAZZI_COMPLETE=bash_source piazzi)"
+COMP_WORDS=(piazzi {typed}) COMP_CWORD=2 COMPREPLY=()
+_piazzi_completion piazzi
+echo "${{COMPREPLY[*]}}" """
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    done = subprocess.run(["bash", "-c", script], env=os.environ | {"PATH": path}, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == offered
+    assert done.stderr.strip() == "files: -o default"
 
 
 def test_help_names_the_estimators_that_there_are(call):

@@ -27,6 +27,12 @@ def test_everything_that_is_in_a_file_is_shown(call, tdm):
         assert words in result.out
 
 
+def test_tracking_in_the_package_is_shown_by_its_name_with_what_its_case_answers(call):
+    for name, count in (("lageos-2", 95), ("ceres-1801", 40)):
+        found = json.loads(call("tracking", name, "--json").out)
+        assert found["rows"] == count and not found["open"], name
+
+
 def test_json_has_counts_passes_conventions_and_what_is_open(call, tdm):
     found = call("tracking", tdm, "--json").document
     assert found["schema"] == "piazzi.tracking/1"

@@ -17,6 +17,13 @@ def test_every_case_has_its_tracking_and_says_how_it_is_run():
         assert f"`piazzi determine {name}` runs it." in (CASES / f"{name}.toml").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(("typed", "meant"), [("ceres", "ceres-1801"), ("lageos2", "lageos-2"), ("LAGEOS-2", "lageos-2")])
+def test_the_name_of_a_case_that_is_nearly_right_is_told_the_right_one(typed, meant):
+    with pytest.raises(FileNotFoundError, match=f"did you mean '{meant}'"):
+        split([typed])
+    assert split(["pass.tdm"])[0] == ["pass.tdm"]  # which may not be there: whoever reads it says so
+
+
 @pytest.mark.slow
 def test_lasers_determine_lageos_2(tmp_path):
     """Half a metre from the state that another laboratory published for 16:00 on 13 February (EME2000, here to 0.7 m)."""

@@ -41,6 +41,9 @@ times = { step = 60.0, count = 100 }
 COMMANDS = """
 --version
 --help
+demo -o demo
+determine lageos-2 --report lageos.html --json
+tracking ceres-1801
 scenarios list --json
 scenarios show
 scenarios check own.toml

@@ -1,5 +1,6 @@
 """What pyproject.toml and constraints.txt say of versions; CI installs the lowest and the newest (`versions.py`)."""
 
+import json
 import re
 import tomllib
 from importlib.metadata import packages_distributions
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.smoke import notebooks
 from tests.smoke.versions import lowest, newest, parts, requirements
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -67,3 +69,17 @@ def test_pins_are_no_nightlies_are_within_the_bounds_and_name_no_index():
         assert numbers(low) <= pins[name.lower()], requirement
         stop = re.search(r"<\s*([\w.]+)", requirement)
         assert stop is None or pins[name.lower()] < numbers(stop[1]), requirement
+
+
+def test_a_notebook_runs_as_code_and_one_that_fails_is_told(tmp_path, capsys):
+    def kept(name, *cells):
+        told = [{"cell_type": kind, "source": text.splitlines(keepends=True)} for kind, text in cells]
+        (tmp_path / name).write_text(json.dumps({"cells": told}))
+        return tmp_path / name
+
+    good = kept("good.ipynb", ("markdown", "Words"), ("code", "x = 1\nx"), ("code", "!exit 0"), ("code", "assert x == 1"))
+    bad = kept("bad.ipynb", ("code", "!exit 3"))
+    assert notebooks.main(tmp_path / "ran", [good, bad]) == 1
+    said = sorted(capsys.readouterr().out.splitlines())
+    assert any(line.startswith("ok ") and "good.ipynb" in line for line in said)
+    assert any(line.startswith("FAILED ") and "bad.ipynb" in line for line in said)

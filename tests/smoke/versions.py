@@ -1,8 +1,9 @@
 """Installs Piazzi with the lowest or the newest versions that it allows, and runs every command with them.
 
-`python tests/smoke/versions.py lowest|newest`: the wheel is built, looked into and installed.  pip knows no lowest versions, so
-each ``name>=1.2,<2`` of pyproject.toml becomes the constraint ``name==1.2``; newest are those that pip finds, upper bounds or
-not, so that what comes next is known before it is allowed.  Everything is made anew in .cache.
+`python tests/smoke/versions.py lowest|newest|pinned`: the wheel is built, looked into and installed where nothing else is.
+pip knows no lowest versions, so each ``name>=1.2,<2`` of pyproject.toml becomes the constraint ``name==1.2``; newest are those
+that pip finds, upper bounds or not, so that what comes next is known before it is allowed.  With the pinned versions every
+notebook of the gallery runs, on kernels that the tests have compiled.  Everything else is made anew in .cache.
 """
 
 import os
@@ -17,6 +18,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = Path(__file__).with_name("commands.py")
+NOTEBOOKS = Path(__file__).with_name("notebooks.py")
+WRITER = ROOT / "docs" / "machinery" / "notebooks.py"
 EXTRAS = ("cluster", "jpl", "msis")  # what a user may ask for beyond what is always there
 
 
@@ -59,27 +62,45 @@ def left_out(wheel: Path) -> list[str]:
     return sorted(name for name in files if name not in inside and "__pycache__" not in name)
 
 
+def written(folder: Path) -> list[Path]:
+    """The notebooks of the gallery, made from its pages."""
+    folder.mkdir()
+    pages = sorted((ROOT / "docs" / "gallery").glob("*.md"))
+    for page in pages:
+        subprocess.run([sys.executable, WRITER, page, folder / f"{page.stem}.ipynb"], check=True)
+    return [folder / f"{page.stem}.ipynb" for page in pages]
+
+
+def steps(which: str, place: Path, wheel: Path, python: Path) -> list[list[str | Path]]:
+    """What is run one after the other: installations, then the trial."""
+    pip = [python, "-m", "pip", "-q", "-q", "--no-input", "--disable-pip-version-check", "install", "--no-compile"]
+    trial = [python, "-P", COMMANDS]
+    if which == "pinned":
+        run = [python, "-P", NOTEBOOKS, place / "ran", *written(place / "notebooks")]
+        return [[*pip, "-c", ROOT / "constraints.txt", wheel], run]
+    if which == "newest":
+        return [[*pip, *map(newest, requirements())], [*pip, "--no-deps", wheel], trial]
+    (place / "constraints.txt").write_text("\n".join(map(lowest, requirements())))
+    return [[*pip, "-c", place / "constraints.txt", f"{wheel}[{','.join(EXTRAS)}]"], trial]
+
+
 def main(which: str) -> int:
     place = ROOT / ".cache" / f"smoke-{which}"
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     venv.create(place / "venv", with_pip=True)
     python = place / "venv" / ("Scripts" if os.name == "nt" else "bin") / "python"
-    pip = [python, "-m", "pip", "-q", "-q", "--no-input", "--disable-pip-version-check", "install", "--no-compile"]
-    environment = {**os.environ, "PIAZZI_CACHE": str(place / "kernels")}
+    warm = os.environ.get("PIAZZI_CACHE", str(ROOT / ".cache" / "tests"))
+    environment = {**os.environ, "PIAZZI_CACHE": warm if which == "pinned" else str(place / "kernels")}
     try:
-        subprocess.run([*pip[:-2], "wheel", "--no-deps", "--wheel-dir", place, ROOT], check=True)
+        build = [python, "-m", "pip", "-q", "-q", "--no-input", "--disable-pip-version-check", "wheel", "--no-deps"]
+        subprocess.run([*build, "--wheel-dir", place, ROOT], check=True)
         (wheel,) = place.glob("*.whl")
         if missing := left_out(wheel):
             print(f"FAILED  {wheel.name} lacks {', '.join(missing)}")
             return 1
-        print(f"{wheel.name}: {wheel.stat().st_size / 1e6:.1f} MB, every file of src/piazzi is in it")
-        if which == "lowest":
-            (place / "constraints.txt").write_text("\n".join(map(lowest, requirements())))
-            steps = [[*pip, "-c", place / "constraints.txt", f"{wheel}[{','.join(EXTRAS)}]"]]
-        else:
-            steps = [[*pip, *map(newest, requirements())], [*pip, "--no-deps", wheel]]
-        for step in [*steps, [python, "-P", COMMANDS]]:
+        print(f"{wheel.name}: {wheel.stat().st_size / 1e6:.1f} MB, every file of src/piazzi is in it", flush=True)
+        for step in steps(which, place, wheel, python):
             subprocess.run(step, env=environment, check=True)
     except subprocess.CalledProcessError as error:
         return error.returncode
@@ -89,6 +110,6 @@ def main(which: str) -> int:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] not in (["lowest"], ["newest"]):
-        sys.exit("usage: versions.py lowest|newest")
+    if sys.argv[1:] not in (["lowest"], ["newest"], ["pinned"]):
+        sys.exit("usage: versions.py lowest|newest|pinned")
     sys.exit(main(sys.argv[1]))

@@ -55,7 +55,7 @@ def piazzi() -> None:
     Examples:
       piazzi demo -o demo                       a first look: tables and pictures
       piazzi tracking pass.tdm                  what is in a file of tracking data
-      piazzi determine fixes.oem -o orbit.oem   an orbit from tracking files
+      piazzi determine lageos-2                 an orbit from tracking: lasers
       piazzi orbits pass.tdm                    every orbit that a tracking allows
       piazzi estimate tracking.npz              the states and their uncertainty
       piazzi compare b612-range --with ekf --with graph

@@ -26,6 +26,7 @@ KINDS = ("png", "pdf", "svg")
 @click.command(cls=options.Command)
 @click.option("-o", "--output", "folder", metavar="DIR", default="demo", show_default=True, help="Folder to write into.")
 @click.option("--format", "kind", type=click.Choice(KINDS), default=KINDS[0], show_default=True, help="Format of the pictures.")
+@results.title_option
 @options.seed
 def command(folder: str, kind: str, seed: int) -> int:
     """Simulate and estimate three problems, with pictures.

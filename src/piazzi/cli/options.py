@@ -12,33 +12,15 @@ from itertools import combinations
 from typing import Any, TypeVar
 
 import click
-from click.shell_completion import CompletionItem
+
+from piazzi.cli.completing import completed
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _scenarios(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """For shells: scenarios that begin so, and files."""
-    from piazzi.scenarios import names
-
-    return [*(CompletionItem(name) for name in names() if name.startswith(incomplete)), CompletionItem(incomplete, type="file")]
-
-
-def _estimators(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """For shells: estimators that begin so."""
-    from piazzi.estimate.registry import ESTIMATORS
-
-    return [CompletionItem(name) for name in ESTIMATORS if name.startswith(incomplete)]
-
-
-source = click.argument("source", metavar="SOURCE", shell_complete=_scenarios)
+source = click.argument("source", metavar="SOURCE")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout, and nothing else there.")
-scenario = click.option(
-    "--scenario",
-    metavar="NAME",
-    shell_complete=_scenarios,
-    help="Scenario that defines the problem, for CSV and tracking files.",
-)
+scenario = click.option("--scenario", metavar="NAME", help="Scenario that defines the problem, for CSV and tracking files.")
 STREAM = "-"
 
 
@@ -66,7 +48,6 @@ def estimators(default: str) -> Callable[[F], F]:
         "names",
         metavar="ESTIMATOR",
         multiple=True,
-        shell_complete=_estimators,
         help=f"Estimator, may be repeated; see below.  [default: {default}]",
     )
 
@@ -79,8 +60,12 @@ def output(what: str) -> Callable[[F], F]:
 class Command(click.Command):
     """A command whose docstring may have a paragraph of examples, which keeps its lines in the help.
 
-    Before it runs, the files that it was given are found to be different ones.
+    Before it runs, the files that it was given are found to be different ones.  Shells complete what it takes.
     """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        completed(self.params)
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         self.help = keep_examples(self.help)
@@ -93,6 +78,8 @@ class Command(click.Command):
 
 class Group(click.Group):
     """The same for a group of commands."""
+
+    command_class = Command
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         self.help = keep_examples(self.help)

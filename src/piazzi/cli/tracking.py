@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from piazzi.cli import options, output, results
+from piazzi.cli.case import said_case
 from piazzi.cli.conventions import conventions, told
 from piazzi.cli.running import DONE
 
@@ -35,6 +36,7 @@ def command(files: tuple[str, ...], output_file: str | None, target: str | None,
 
     Examples:
       piazzi tracking pass.tdm
+      piazzi tracking lageos-2                 the lasers in the package
       piazzi tracking lageos2.npt -o when.png
       piazzi tracking night.tdm.gz --range two-way --to night.csv
     """
@@ -43,7 +45,8 @@ def command(files: tuple[str, ...], output_file: str | None, target: str | None,
     from piazzi.formats import read_tracking
     from piazzi.formats.contents import summary
 
-    rows = read_tracking(*files, **told(answers))
+    files, case = said_case(files, {})
+    rows = read_tracking(*files, **{**case.answers, **told(answers)})
     wrote = []
     if target is not None:
         _write(target, files[0], rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from piazzi.determination.case import ANSWERS, OPTIONS, Case
-from piazzi.text import nearest, one_line
+from piazzi.text import nearest, one_line, suggest
 
 SECTIONS = ("determine", "object", "product")
 ENDING = ".toml"
@@ -37,10 +38,20 @@ def split(given: Sequence[Any]) -> tuple[list[Any], Case]:
 
 
 def shipped(given: Any) -> list[Any]:
-    """The files of a case of the package, by its name where no file is called so; else what was given."""
-    if not isinstance(given, str) or given not in names() or os.path.exists(given):
+    """The files of a case of the package, by its name where no file is called so; else what was given.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where no file is called so, and the name is nearly that of a case.
+    """
+    if not isinstance(given, str) or os.path.exists(given):
         return [given]
-    return [str(CASES / f"{given}.toml"), str(CASES / f"{given}.txt")]
+    if given in names():
+        return [str(CASES / f"{given}.toml"), str(CASES / f"{given}.txt")]
+    if hint := suggest(given, names()):
+        raise FileNotFoundError(errno.ENOENT, f"{os.strerror(errno.ENOENT)}{hint}", given)
+    return [given]
 
 
 def names() -> list[str]:
