@@ -14,7 +14,14 @@ def later(module: str, name: str) -> Any:
     return getattr(import_module(f"piazzi.{module}"), name)
 
 
-class Drawn:
+class Shown:
+    """Something that a notebook shows as a table."""
+
+    def _repr_html_(self) -> str:
+        return str(later("present.shown", "html")(self))
+
+
+class Drawn(Shown):
     """Something with a picture."""
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
@@ -33,3 +40,7 @@ class Drawn:
         """
         drawn: Axes = later("present.plots", "plot")(self, ax, **options)
         return drawn
+
+    def to_latex(self) -> str:
+        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
+        return str(later("present.shown", "latex")(self))

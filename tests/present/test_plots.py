@@ -107,3 +107,48 @@ def test_built_in_scenarios_by_name():
     found = pz.scenarios()
     assert found["satellite-bearing"] == "Satellite in a plane, seen by its bearing"
     assert list(found) == pz.scenarios.names()
+
+
+NAMED = "<script>alert(1)</script>"
+
+
+def test_notebooks_show_tables_short_and_escaped(results):
+    from dataclasses import replace
+
+    problem = replace(results["problem"], name=NAMED)
+    estimate = replace(results["estimate"], problem=problem)
+    things = [problem, problem.model, estimate, results["tracking"], results["study"], results["study"].summary]
+    for thing in [*things, results["comparison"], pz.earth.Epoch("2026-11-03T10:00:00 UTC")]:
+        html = thing._repr_html_()
+        assert "<table" in html and "<script" not in html, type(thing)
+        assert len(html) < 6000, (type(thing), len(html))
+    assert "&lt;script&gt;" in problem._repr_html_()
+
+
+def cells(html: str) -> list[list[str]]:
+    import re
+
+    rows = re.findall(r"<tr>(.*?)</tr>", html)
+    return [re.findall(r"<t[hd]>(.*?)</t[hd]>", row) for row in rows]
+
+
+def test_tables_of_notebooks_say_what_is_so(results):
+    problem, tracking = results["problem"], results["tracking"]
+    prior = {row[0]: row[1:] for row in cells(problem._repr_html_()) if len(row) == 4}
+    i = problem.model.names.index("vx")
+    assert float(prior["vx"][0]) * {"km/s": 1e3, "m/s": 1.0}[prior["vx"][2]] == pytest.approx(problem.mean[i], abs=1e-6)
+    (row,) = [r for r in cells(tracking._repr_html_()) if r[0] != "station"]
+    assert row[1] == f"{len(tracking.row_times):,}" and row[2] == "0"
+    equations = {row[0]: row[1] for row in cells(problem.model._repr_html_())}
+    assert equations["dx/dt"] == "vx"
+    scales = dict(cells(pz.earth.Epoch("2017-01-01T00:00:00 UTC")._repr_html_())[1:])
+    assert scales["TAI"] == "2017-01-01T00:00:37" and scales["TT"] == "2017-01-01T00:01:09.184"
+
+
+def test_every_table_is_latex_too(results):
+    for name in (*DRAWN, "summary"):
+        thing = results["study"].summary if name == "summary" else results[name]
+        text = thing.to_latex()
+        assert text.count(r"\begin{tabular}") == text.count(r"\end{tabular}") >= 1, name
+        widths = {line.count(" & ") for line in text.splitlines() if line.endswith(r"\\")}
+        assert len(widths) <= text.count(r"\begin{tabular}"), name

@@ -153,6 +153,12 @@ class Sky:
     def _repr_html_(self) -> str:
         return as_html([self._grid()], [self.heading])
 
+    def to_latex(self) -> str:
+        """Its table as LaTeX (booktabs)."""
+        from piazzi.evaluate.latex import as_latex
+
+        return as_latex([self._grid()])
+
     @property
     def heading(self) -> str:
         """What is seen from where, and what the directions are."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.drawn import Shown
 from piazzi.earth import scales
 from piazzi.earth.dates import HINT, Reading, read_date, scale_named, write_date
 from piazzi.earth.eop import tables
@@ -18,7 +19,7 @@ from piazzi.earth.scales import Orientation
 
 @total_ordering
 @dataclass(frozen=True, init=False, repr=False)
-class Epoch:
+class Epoch(Shown):
     """An instant of time, kept as whole seconds and a fraction of TT past J2000.0.
 
     Parameters

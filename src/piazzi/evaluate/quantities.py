@@ -9,6 +9,7 @@ from math import floor, inf, isfinite, log10, pi, sqrt
 NOTHING = "-"
 # SI unit -> unit for large values, the factor to it, and the size from which it is used
 _LARGE = {"m": ("km", 1e-3, 1e4), "m/s": ("km/s", 1e-3, 1e3), "m^2/s": ("km^2/s", 1e-6, 1e9)}
+_FINE = pi / 180 / 36  # a hundred seconds of arc
 _ALWAYS = {"rad": ("deg", 180 / pi), "rad/s": ("deg/s", 180 / pi)}
 
 
@@ -36,6 +37,13 @@ def display_of(unit: str, values: Iterable[float | None] = ()) -> Display:
     largest = max((abs(v) for v in values if v is not None and isfinite(v)), default=0.0)
     name, factor, start = _LARGE.get(unit, (unit, 1.0, inf))
     return Display(name, factor) if largest >= start else Display(unit)
+
+
+def fine(unit: str, size: float) -> Display:
+    """The unit to show differences of about this size in: small angles in seconds of arc."""
+    if unit == "rad" and 0.0 < abs(size) < _FINE:
+        return Display("arcsec", 3600.0 * 180.0 / pi)
+    return display_of(unit, [size])
 
 
 def displays(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from piazzi.drawn import Shown
 from piazzi.expressions import FUNCTIONS, names
 from piazzi.model.definitions import STEP, TIME, Definition, Hoist, definitions_of, in_order, name_of, needed, unused
 from piazzi.model.events import check_events, events_of
@@ -16,7 +17,7 @@ from piazzi.text import listed, nearest, suggest
 
 
 @dataclass(frozen=True)
-class Model:
+class Model(Shown):
     """Dynamics and sensors as equations, from which everything else is derived.
 
     Parameters

@@ -9,7 +9,7 @@ import numpy as np
 
 from piazzi.estimate.estimator import Estimate
 from piazzi.estimate.forecast import Forecast
-from piazzi.evaluate.grids import rich_table
+from piazzi.evaluate.grids import Grid, rich_table
 from piazzi.evaluate.metrics import errors, residual_rms
 from piazzi.evaluate.quantities import Display, display_of, displays, duration, number, with_sigma
 from piazzi.model import Model
@@ -64,11 +64,8 @@ def _count(many: int, what: str) -> str:
     return f"{many:,} {what}{'' if many == 1 else 's'}"
 
 
-def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
-    """A rich table of every state at epoch `k` with its standard deviation, and its error where the truth is known."""
-    from rich.console import Group
-    from rich.text import Text
-
+def state_grid(name: str, estimate: Estimate, k: int = -1) -> Grid:
+    """Every state at epoch `k` with its standard deviation, and its error where the truth is known."""
     error = errors(estimate)
     view = "with later measurements too" if estimate.view == "delayed" else "from measurements up to then"
     date = _date(estimate.epoch, float(estimate.times[k]))
@@ -84,7 +81,16 @@ def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
             e = float(error[k, i]) * show.factor
             texts.append(with_sigma(e, sigma * show.factor)[0] if np.isfinite(e) else "-")
         rows.append((state, *texts, printable(show.unit)))
-    return Group(Text(printable(title), style="bold"), _table(heads, rows))
+    return Grid(title, heads, tuple(rows))
+
+
+def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
+    """`state_grid` for terminals."""
+    from rich.console import Group
+    from rich.text import Text
+
+    grid = state_grid(name, estimate, k)
+    return Group(Text(printable(grid.title), style="bold"), _table(grid.heads, grid.rows))
 
 
 def _shows(model: Model, names: Sequence[str], values: Sequence[Sequence[float]]) -> list[Display]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.drawn import later
+from piazzi.drawn import Shown, later
 from piazzi.kernels import Integrator, Kepler, KernelSpec, RungeKutta8
 from piazzi.kernels.bundle import Belief, Given
 from piazzi.kernels.spec import outside_fragments
@@ -25,7 +25,7 @@ from piazzi.text import listed, nearest
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(Shown):
     """Everything an estimator needs besides the measurements.
 
     Parameters
