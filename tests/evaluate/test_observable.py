@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi.evaluate.information import along, bound, factor, from_first, growth, predicted, propagated, singular
-from piazzi.evaluate.twins import find_twins
+from piazzi.evaluate.twins import find_twins, fit
 from piazzi.problem.inputs import prepare
 from tests.laws.problems import linear, network, random_covariance, random_stable, satellite
 
@@ -187,9 +187,42 @@ def test_a_twin_of_a_long_run_is_fitted_to_all_of_it(monkeypatch):
     monkeypatch.setattr("piazzi.evaluate.twins._SEARCHED", 30)
     inputs = prepare(problem, tracking)
     root = factor(along(problem, inputs, tracking.truth).rows)
-    (twin,) = find_twins(problem, inputs, tracking.truth[0], np.ones(4), root)
+    (twin,) = find_twins(problem, inputs, tracking.truth[0], np.ones(4), root).twins
     assert_allclose(twin.state, [11, 0, 0, -10], atol=1e-6)
     assert twin.misfit < 1e-6
+
+
+def test_a_costly_search_ends_at_its_budget_and_says_what_was_searched(monkeypatch):
+    """Passes are counted; the nearest starts come first, so that a twin near the prior is still found."""
+    from piazzi.evaluate import twins
+
+    problem, tracking = range_only()
+    inputs = prepare(problem, tracking)
+    every = pz.observability(problem, tracking).searched
+    assert every.fitted == every.starts > 20
+    passes, count = [], twins.from_first
+    monkeypatch.setattr(twins, "_BUDGET", 0.0)
+    monkeypatch.setattr(twins, "_LEAST", 30)
+    monkeypatch.setattr(twins, "from_first", lambda p, i, x: passes.append(i.epochs) or count(p, i, x))
+    steps = []
+    root = factor(along(problem, inputs, tracking.truth).rows)
+    search = find_twins(problem, inputs, tracking.truth[0], np.ones(4), root, steps.append)
+    assert 0 < search.fitted < search.starts == every.starts
+    assert sum(epochs == len(tracking.times) for epochs in passes) <= 30 + len(search.twins) + 1
+    assert steps == [f"looking for twins: start {i + 1} of {search.starts}" for i in range(search.fitted)]
+    found = replace(pz.observability(problem, tracking, twins=False), searched=replace(search, twins=()))
+    assert f"none found from {search.fitted} starts, those that come nearest of {search.starts}." in found.verdict
+    assert found.to_dict()["searched"] == {"starts": search.starts, "fitted": search.fitted}
+
+
+def test_a_start_in_the_basin_of_a_known_solution_costs_few_passes():
+    problem, tracking = range_only()
+    inputs = prepare(problem, tracking)
+    first = tracking.truth[0]
+    bare = replace(inputs, z=predicted(problem, inputs, propagated(problem, inputs, first)))
+    state, misfit, passes = fit(problem, bare, first + 0.01, np.ones(4), 40, known=lambda x: bool(abs(x - first).max() < 0.1))
+    assert misfit < 1
+    assert passes <= 4
 
 
 def test_the_notebooks_question_is_answered():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from piazzi.cli import options, results
+from piazzi.cli import options, output, results
 from piazzi.cli.conventions import recording as recording_options
 
 if TYPE_CHECKING:
@@ -65,7 +65,10 @@ def command(
     anew: dict[str, Any] = {}
     if add and not source_found.recorded and source != STDIN:
         anew = {"times": load_scenario(source).times, "seed": seed}
-    found = observability(problem, tracking, add=add, twins=not no_twins, source=source_found.name, **anew)
+    with output.progress(100) as announce:
+        found = observability(
+            problem, tracking, add=add, twins=not no_twins, source=source_found.name, announce=announce, **anew
+        )
 
     def tab() -> Tab:
         from piazzi.present.report import observability_tab

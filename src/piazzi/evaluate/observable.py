@@ -14,7 +14,7 @@ from piazzi.evaluate.attempts import Attempt
 from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
 from piazzi.evaluate.information import Information
 from piazzi.evaluate.quantities import displays, finite, number
-from piazzi.evaluate.twins import Twin
+from piazzi.evaluate.twins import Search, Twin
 from piazzi.evaluate.verdict import AS_THE_PRIOR, conclusion, local, twins_found, unreliable, weakest
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
@@ -46,6 +46,7 @@ class Observability(Drawn):
     twins : tuple of Twin, other first states with the same measurements, best first
     attempts : tuple of Attempt, what estimators made of it beside the bound; empty without truth
     added : Observability with further stations, None where none were asked for
+    searched : Search, how many starts there were for twins, and from how many of them a fit was made
     message : why the factor graph, whose estimate stands in for the truth, did not succeed; "" where it did
     """
 
@@ -64,6 +65,7 @@ class Observability(Drawn):
     attempts: tuple[Attempt, ...] = ()
     added: Observability | None = None
     message: str = ""
+    searched: Search = Search()
 
     @property
     def success(self) -> bool:
@@ -95,7 +97,7 @@ class Observability(Drawn):
         parts = [
             *unreliable(self.message),
             *local(model, self.information, self.weakest_direction, self.since, noise=noise),
-            *twins_found(model.names, self.twins, count, continuum=self.information.blind > 0),
+            *twins_found(model.names, self.searched, count, continuum=self.information.blind > 0),
             *conclusion(self.attempts, model.n, blind=self.information.blind > 0),
         ]
         return printable(" ".join(parts))
@@ -119,6 +121,7 @@ class Observability(Drawn):
             **self.information.to_dict(),
             "weakest_direction": self.weakest_direction,
             "twins": [twin.to_dict() for twin in self.twins],
+            "searched": self.searched.to_dict(),
             "verdict": self.verdict,
             "about": self.about,
             "success": self.success,

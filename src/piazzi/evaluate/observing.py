@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from piazzi.evaluate.attempts import attempts
 from piazzi.evaluate.bounds import full_truth
 from piazzi.evaluate.information import Information, along, bound, factor, growth, singular
 from piazzi.evaluate.observable import Observability
-from piazzi.evaluate.twins import find_twins
+from piazzi.evaluate.twins import Search, find_twins
 from piazzi.model import Sensor
 from piazzi.problem import Problem, ProcessNoise, Station, Tracking
 from piazzi.problem.checks import Array
@@ -33,6 +33,7 @@ def observability(
     source: str = "",
     times: Any = None,
     seed: int = 0,
+    announce: Callable[[str], object] = lambda step: None,
 ) -> Observability:
     """What the measurements say about the first state, at the truth (where it is not known, at the factor graph's estimate).
 
@@ -50,6 +51,7 @@ def observability(
     source : where the measurements came from, for the record
     times, seed : of the simulation that the tracking is, where the added stations may measure at other epochs than those
         it has, by their own rules and schedules: all are simulated anew
+    announce : told what is being done, of what takes long
 
     Raises
     ------
@@ -60,7 +62,7 @@ def observability(
     inputs = prepare(problem, tracking)
     more = _with_stations(problem, add) if add else None
     states, about, message = _about(problem, tracking)
-    found = _observability(problem, tracking, inputs, states, about, twins, source)
+    found = _observability(problem, tracking, inputs, states, about, twins, source, announce)
     found = replace(found, attempts=attempts(problem, tracking, found.twins), message=message)
     if more is None:
         return found
@@ -69,7 +71,7 @@ def observability(
     else:
         wider = simulate(more, times, np.random.default_rng(seed))
         states = _about(more, wider)[0]
-    return replace(found, added=_observability(more, wider, prepare(more, wider), states, about, twins, source))
+    return replace(found, added=_observability(more, wider, prepare(more, wider), states, about, twins, source, announce))
 
 
 def _with_stations(problem: Problem, add: Sequence[Addition]) -> Problem:
@@ -91,7 +93,14 @@ def _about(problem: Problem, tracking: Tracking) -> tuple[Array, str, str]:
 
 
 def _observability(
-    problem: Problem, tracking: Tracking, inputs: Inputs, states: Array, about: str, twins: bool, source: str
+    problem: Problem,
+    tracking: Tracking,
+    inputs: Inputs,
+    states: Array,
+    about: str,
+    twins: bool,
+    source: str,
+    announce: Callable[[str], object],
 ) -> Observability:
     sigma = np.sqrt(np.diag(problem.covariance))
     scale = np.where(sigma > 0, sigma, 1.0)
@@ -104,7 +113,7 @@ def _observability(
         noiseless = replace(problem, process_noise=ProcessNoise(np.zeros(len(problem.model.states)), "step"), truth=None)
         without_noise = _summary(factor(_finite(along(noiseless, inputs, states).rows * scale)), scale)
     root = factor(rows)
-    others = find_twins(problem, inputs, states[0], scale, root) if twins else ()
+    search = find_twins(problem, inputs, states[0], scale, root, announce) if twins else Search()
     return Observability(
         problem,
         tracking,
@@ -117,7 +126,8 @@ def _observability(
         inputs.t[epochs],
         values,
         bound(values, directions) * scale,
-        others,
+        search.twins,
+        searched=search,
     )
 
 

@@ -11,7 +11,7 @@ from piazzi.evaluate.attempts import Attempt
 from piazzi.evaluate.information import Information
 from piazzi.evaluate.judgement import CLEARLY
 from piazzi.evaluate.quantities import displays, number
-from piazzi.evaluate.twins import Twin
+from piazzi.evaluate.twins import Search
 from piazzi.model import Model
 from piazzi.problem.checks import Array
 
@@ -62,10 +62,12 @@ def local(
     ]
 
 
-def twins_found(names: Sequence[str], twins: Sequence[Twin], count: int, *, continuum: bool) -> list[str]:
+def twins_found(names: Sequence[str], search: Search, count: int, *, continuum: bool) -> list[str]:
     """The twins of states of these names, for so many measurements; a continuum of them where directions are unobservable."""
+    twins = search.twins
     if not twins:
-        return ["Twins: none found."]
+        part = "" if search.fitted == search.starts else f", those that come nearest of {search.starts}"
+        return [f"Twins: none found from {search.fitted} starts{part}." if search.starts else "Twins: not looked for."]
     if continuum:
         return [f"Twins: a continuum of first states gives the same measurements; {len(twins)} of them were found."]
     out = []
