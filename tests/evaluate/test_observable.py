@@ -220,7 +220,7 @@ def test_a_start_in_the_basin_of_a_known_solution_costs_few_passes():
     inputs = prepare(problem, tracking)
     first = tracking.truth[0]
     bare = replace(inputs, z=predicted(problem, inputs, propagated(problem, inputs, first)))
-    state, misfit, passes = fit(problem, bare, first + 0.01, np.ones(4), 40, known=lambda x: bool(abs(x - first).max() < 0.1))
+    _, misfit, passes = fit(problem, bare, first + 0.01, np.ones(4), 40, known=lambda x: bool(abs(x - first).max() < 0.1))
     assert misfit < 1
     assert passes <= 4
 

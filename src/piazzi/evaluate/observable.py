@@ -14,7 +14,7 @@ from piazzi.evaluate.attempts import Attempt
 from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
 from piazzi.evaluate.information import Information
 from piazzi.evaluate.quantities import displays, finite, number
-from piazzi.evaluate.twins import Search, Twin
+from piazzi.evaluate.twins import NO_SEARCH, Search, Twin
 from piazzi.evaluate.verdict import AS_THE_PRIOR, conclusion, local, twins_found, unreliable, weakest
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
@@ -65,7 +65,7 @@ class Observability(Drawn):
     attempts: tuple[Attempt, ...] = ()
     added: Observability | None = None
     message: str = ""
-    searched: Search = Search()
+    searched: Search = NO_SEARCH
 
     @property
     def success(self) -> bool:

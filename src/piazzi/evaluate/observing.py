@@ -13,7 +13,7 @@ from piazzi.evaluate.attempts import attempts
 from piazzi.evaluate.bounds import full_truth
 from piazzi.evaluate.information import Information, along, bound, factor, growth, singular
 from piazzi.evaluate.observable import Observability
-from piazzi.evaluate.twins import Search, find_twins
+from piazzi.evaluate.twins import NO_SEARCH, find_twins
 from piazzi.model import Sensor
 from piazzi.problem import Problem, ProcessNoise, Station, Tracking
 from piazzi.problem.checks import Array
@@ -113,7 +113,7 @@ def _observability(
         noiseless = replace(problem, process_noise=ProcessNoise(np.zeros(len(problem.model.states)), "step"), truth=None)
         without_noise = _summary(factor(_finite(along(noiseless, inputs, states).rows * scale)), scale)
     root = factor(rows)
-    search = find_twins(problem, inputs, states[0], scale, root, announce) if twins else Search()
+    search = find_twins(problem, inputs, states[0], scale, root, announce) if twins else NO_SEARCH
     return Observability(
         problem,
         tracking,

@@ -66,6 +66,9 @@ class Search:
         return {"starts": self.starts, "fitted": self.fitted}
 
 
+NO_SEARCH = Search()
+
+
 def find_twins(
     problem: Problem,
     inputs: Inputs,
@@ -87,7 +90,7 @@ def find_twins(
     """
     whole = _noiseless(problem, inputs, first)
     if whole is None:
-        return Search()
+        return NO_SEARCH
     begun = _head(whole, _SEARCHED)
     left = max(_LEAST, _BUDGET / (max(int(begun.count.sum()), 1) * len(first) ** 2))
     queue = list(starts(problem, first, unit, root))
