@@ -323,3 +323,25 @@ def test_eccentricities_alone_are_no_stations(data_dir):
 def test_an_unknown_name_is_met_with_the_nearest():
     with pytest.raises(KeyError, match="did you mean"):
         earth.ilrs_stations()["70900"]
+
+
+SITES = """# No ID   Latitude Longitude   Elev   Observer
+#0000 AA   51.9114    5.1736      0    Somebody on the way
+4171 AA   52.8344    6.3785     10    A. Observer
+8048 BB   49.4175 -123.6420      1.   B. Observer (garden)
+4171 AA   52.8350    6.3785     12    A. Observer, new hut
+"""
+
+
+def test_sites_of_observers_of_satellites(tmp_path):
+    path = tmp_path / "sites.txt"
+    path.write_text(SITES)
+    found = read_stations(path)
+    assert [s.name for s in found.stations] == ["4171", "8048"] and any("ellipsoid" in note for note in found.notes)
+    text = '[[stations]]\nname = "4171"\nlatitude = 52.8350\nlongitude = 6.3785\nheight = 12\n'
+    (tmp_path / "s.toml").write_text(text)
+    (same,) = read_stations(tmp_path / "s.toml").stations
+    assert found.stations[0].coordinates[0].position == same.coordinates[0].position
+    path.write_text(SITES + "8049 BB   91 west\n")
+    with pytest.raises(ValueError, match=r"sites\.txt: line 6: a site has a number"):
+        read_stations(path)

@@ -191,3 +191,35 @@ def test_a_million_lines_in_three_seconds(tmp_path):
     start = perf_counter()
     assert len(pz.read_tracking(path)) == 100_000
     assert perf_counter() - start < 1.0  # a tenth of the lines, three times as long for a machine with others on it
+
+
+@pytest.mark.parametrize(
+    "name, first, instant",
+    [
+        ("time[MJD UTC]", "58130.5", "2018-01-12T12:00:00 UTC"),
+        ("time[JD TDB]", "2458131.0", "2018-01-12T12:00:00 TDB"),
+        ("time[jd]", "2458131.0", "2018-01-12T12:00:00 GPS"),
+        ("time", "2018/01/12 12:00:00", "2018-01-12T12:00:00 GPS"),
+    ],
+)
+def test_julian_days_and_dates_with_strokes(tmp_path, name, first, instant):
+    path = tmp_path / "a.csv"
+    path.write_text(f"{name},station,azimuth[deg],elevation[deg]\n{first},A,10,20\n{first},B,11,20\n")
+    table = pz.read_tracking(path, scale=None if " " in name else "GPS")
+    assert abs(table.instant(3) - pz.Epoch(instant)) < 1e-9 and table.stations == ("A", "B")
+
+
+def test_julian_days_of_many_rows(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{58130 + i / 4096!r},A,{i},20\n" for i in range(40_000))
+    path.write_text("time[MJD UTC],station,range[m],azimuth[deg]\n" + rows)
+    table = pz.read_tracking(path, range="one-way")
+    days = table.t[table.of_kind("range")] / 86400
+    np.testing.assert_allclose(days - days[0], np.arange(40_000) / 4096, atol=1e-12)
+
+
+def test_times_in_a_unit_that_is_no_scale(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time[day],station,range[m]\n58130.5,A,10\n")
+    with pytest.raises(ValueError, match=r"column 'time\[day\]' is no time: .* time\[MJD UTC\]"):
+        pz.read_tracking(path)

@@ -63,6 +63,58 @@ def test_reports_without_a_position_are_counted(tmp_path):
     assert len(table) == 2 and table.left_out == (("reports without a position", 1),)
 
 
+def test_reports_in_a_letter(tmp_path):
+    lines = (
+        "# clock by radio",
+        "Site 2007: good sky, some haze until 22h",
+        "",
+        iod(),
+        "> and a flash of another:",
+        "12345 98 123XYZ 2007 E 19981122010534264 F flared, P = 3.2 sec.",
+        iod().replace(" S ", "   "),
+        "12345 98 123XYZ 2007 S 19981122",
+    )
+    table = pz.read_tracking(put(tmp_path, *lines))
+    assert table.line.tolist() == [4, 4, 7, 7]
+    assert dict(table.left_out) == {"lines of text between reports": 3, "reports without a position": 2}
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_list_of_uk_reports_with_its_end(tmp_path, end):
+    line = "8406503987697070622352907  01   12200054  +28239  01  4"
+    path = tmp_path / "a.txt"
+    path.write_bytes(end.join(["SATOBS", line, line, "999", "regards"]).encode())
+    table = pz.read_tracking(path)
+    assert table.line.tolist() == [2, 2, 3, 3] and dict(table.left_out) == {"lines of text between reports": 2}
+
+
+@pytest.mark.parametrize(
+    "code, angles, values, unit",
+    [
+        ("4", "1112233 +112233 ", [111 + 22 / 60 + 33 / 3600, 11 + 22 / 60 + 33 / 3600], 20.0),
+        ("5", "11122334 1122334", [111 + 22.334 / 60, 11 + 22.334 / 60], 2.0 * 60),
+        ("6", "11122334+1122334", [111.22334, 11.22334], 0.2 * 3600),
+    ],
+)
+def test_azimuths_of_uk_reports(tmp_path, code, angles, values, unit):
+    table = pz.read_tracking(put(tmp_path, f"8406503987697070622352907  01   1{code}{angles} 20 4"))
+    assert table.kinds == ("azimuth", "elevation")
+    np.testing.assert_allclose(np.degrees(table.value), values, rtol=1e-13)
+    np.testing.assert_allclose(table.sigma, unit * ARCSECOND, rtol=1e-12)
+
+
+def test_rde_report_in_a_letter(tmp_path):
+    report = ("2420 0405 0.211 1204", "05", "0401203 205744.76 185544+324606 4.0 5.8 3 R", "999")
+    table = pz.read_tracking(put(tmp_path, "SATOBS", "", *report, "", "Total (2004) 1241"))
+    assert len(table) == 2 and table.stations == ("2420",) and dict(table.left_out) == {"lines of text between reports": 2}
+
+
+@pytest.mark.parametrize("line", [" " + iod(), ">" + iod(), iod().replace("XYZ 2007", "XYZ 207")])
+def test_reports_out_of_their_columns_are_refused(tmp_path, line):
+    with pytest.raises(ValueError, match=r"line 2: .* looks like a report, and does not stand in its columns"):
+        pz.read_tracking(put(tmp_path, iod(), line))
+
+
 def test_uk_report(tmp_path):
     line = "8406503987697070622352907  01   12200054  +28239  01  4             +60+70     R"
     table = pz.read_tracking(put(tmp_path, line))
@@ -102,6 +154,7 @@ def test_rde_report(tmp_path):
         (iod(first="2522334"), "is on no sphere"),
         (iod(time="2522"), "25:22:0 is no time"),
         (iod(accuracy="4x"), "accuracy of the position is '4x'"),
+        (iod(time="1122334441"), "column 41 has '1' where there is a blank"),
     ],
 )
 def test_each_mistake_has_one_line(tmp_path, line, what):

@@ -10,7 +10,7 @@ import numpy as np
 from piazzi.earth import scales
 from piazzi.text import shown
 
-_CALENDAR = r"(?P<year>\d{4})-(?:(?P<month>\d{1,2})-(?P<day>\d{1,2})|(?P<doy>\d{3}))"
+_CALENDAR = r"(?P<year>\d{4})(?:(?P<mark>[-/])(?P<month>\d{1,2})(?P=mark)(?P<day>\d{1,2})|-(?P<doy>\d{3}))"
 _CLOCK = r"(?:[T ](?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,](?P<fraction>\d+))?)?)?"
 _SCALE = r"(?:\s*(?P<zone>Z|[+-]\d{2}:\d{2})|\s+\[?(?P<scale>[A-Za-z]\w*)\]?|\[(?P<bracket>[A-Za-z]\w*)\])?"
 _DATE = re.compile(_CALENDAR + _CLOCK + _SCALE, re.ASCII)

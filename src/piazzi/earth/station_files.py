@@ -1,4 +1,6 @@
-"""Files of stations: TOML, SINEX, eccentricities, and observatory codes of the Minor Planet Center, told apart by content."""
+"""Files of stations: TOML, SINEX, eccentricities, observatory codes of the Minor Planet Center and lists of the sites of
+visual observers, told apart by content.
+"""
 
 from __future__ import annotations
 
@@ -35,6 +37,7 @@ KEYS = (
     "sigma", "mask", "description",
 )  # fmt: skip
 _ANGLES = ("azimuth", "elevation", "right_ascension", "declination")
+_SITE = re.compile(r"(\d{4}) +(\S{1,3}) +([-+]?\d+\.\d*) +([-+]?\d+\.\d*) +([-+]?\d+\.?\d*)\s+(\S.*?)\s*")
 _NEAR = 5e4  # m: within this a station is taken for one of the ILRS that has its name
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*\S)\s*")
 
@@ -43,7 +46,8 @@ def read_stations(*paths: str | Path) -> StationList:
     """Stations of files, which are told apart by content.
 
     Takes TOML (``[[stations]]``), SINEX with coordinates and velocities, SINEX with eccentricities only, which are given to
-    the stations of the other files, and the list of observatory codes of the Minor Planet Center, text or JSON.  Sites of a
+    the stations of the other files, the list of observatory codes of the Minor Planet Center, text or JSON, and the lists of
+    sites of visual and radio observers (number, initials, latitude, longitude, height, name; # begins remarks).  Sites of a
     SINEX file for which no file has eccentricities get those of the list of the ILRS in the package, which `notes` says.
 
     Raises ValueError with the file and the place where a value cannot be read, and OSError where a file cannot be opened.
@@ -64,6 +68,8 @@ def read_stations(*paths: str | Path) -> StationList:
                 offsets.setdefault(site, []).extend(rows)
         elif start.lstrip().startswith(b"{") or re.search(rb"(?m)^\w\d\d [ \d]{2}\d\.\d{4}", start):
             found += read_observatories(path, notes)
+        elif any(map(_SITE.fullmatch, start.decode("latin-1").splitlines())):
+            found += _sites(path, notes)
         else:
             found += _toml(path)
     found += [_with_offsets(s, offsets, notes) for s in surveys]
@@ -91,13 +97,33 @@ def _with_offsets(station: Station, offsets: dict[str, list[Eccentricity]], note
     return replace(station, eccentricities=chosen)
 
 
+def _sites(path: Path, notes: list[str]) -> list[Station]:
+    """Sites of observers of satellites, a line each; of a number that several have, the last."""
+    with opened(path) as file:
+        lines = file.read().decode("utf-8", "replace").splitlines()
+    found: dict[str, Station] = {}
+    for at, text in enumerate(lines, 1):
+        if not text.strip() or text.startswith("#"):
+            continue
+        match = _SITE.fullmatch(text)
+        if match is None:
+            what = "a site has a number, initials, latitude, longitude (deg), height (m) and a name"
+            raise ValueError(f"{path.name}: line {at}: {what}")
+        number, _, latitude, longitude, height, who = match.groups()
+        place = {"latitude": float(latitude), "longitude": float(longitude), "height": float(height)}
+        row = {"name": number, "description": who, **place}
+        found[number] = replace(station_of(row, f"{path.name}: line {at}"), source=path.name)
+    notes.append(f"{path.name}: heights of sites are taken as above the ellipsoid")
+    return list(found.values())
+
+
 def _toml(path: Path) -> list[Station]:
     with opened(path) as file:
         raw = file.read()
     try:
         data = tomllib.loads(raw.decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path.name}: neither SINEX, observatory codes nor TOML: {error}") from None
+        raise ValueError(f"{path.name}: neither SINEX, observatory codes, sites of observers nor TOML: {error}") from None
     rows = data.get("stations")
     if not isinstance(rows, list) or not rows:
         raise ValueError(f"{path.name}: no [[stations]]; each has name, latitude, longitude and height")

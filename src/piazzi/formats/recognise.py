@@ -51,6 +51,15 @@ def _in_columns(pattern: bytes) -> Callable[[bytes], bool]:
     return lambda head: compiled.match(head) is not None
 
 
+def _has_line(pattern: bytes) -> Callable[[bytes], bool]:
+    """Whether any line begins like that: reports that stand in letters, below words."""
+    compiled = re.compile(rb"^" + pattern, re.M)
+    return lambda head: compiled.search(head) is not None
+
+
+_FREQUENCIES = _begins(
+    rb"(?:#[^\n]*\n\s*)*(?:\d{5}\.\d+|\d\d/\d\d/\d\d \d\d:\d\d:\d\d\.\d*)[ \t]+\d{7,}(?:\.\d*)?[ \t]+\S+[ \t]+\d{1,4}\b"
+)
 _PLAIN = _begins(rb"(?:#[^\n]*\n\s*)*[0-3]\s+\S+\s+\S+\s+[12]\d{3}\s+\d+\s+\d+\s+\d+\s+\d+\s+\d+\.\d*\s")
 
 TABLE = "CSV"
@@ -60,9 +69,6 @@ FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "CRD": Format(_begins(_REMARKS + rb"[Hh]1\s"), tracking="crd:read"),
     "MPC": Format(_in_columns(rb"[^\n]{14}[^\n]\d{4} [ \d]\d [ \d]\d[^\n]{54}\S"), tracking="mpc:read"),
     "B3": Format(_in_columns(rb"[A-Z][ \d]{5}[ \w]{3}\d{14}[^\n]{51}\d[^\n]*"), tracking="b3:read"),
-    "IOD": Format(_in_columns(rb"[ \d]{5} [ \d]{2} [ \d]{3}[A-Z ]{3} \d{4} [A-Z] \d{8}[^\n]*"), tracking="visual:read_iod"),
-    "UK": Format(_in_columns(rb"\d{5}\w{2}\d{10}[ \d]{15}[ \d][1-9][ \d]{8}[^\n]*"), tracking="visual:read_uk"),
-    "RDE": Format(_in_columns(rb"\d{4} \d{4} \d\.\d{3} [ \d]{4}[ \r]*\n\d\d?"), tracking="visual:read_rde"),
     "observatory": Format(_begins(rb"(?:#[^\n]*\n\s*)*OBSERVATIONS OF AN OBSERVATORY"), tracking="old_table:read"),
     "plain columns": Format(_PLAIN, tracking="plain:read"),
     "ADES": Format(_begins(rb"(?:[#!][^\n]*\n)*[^\n|]*\|(?:[^\n]*\|)?\s*obsTime\s*[|\n]"), tracking="ades:read_psv"),
@@ -75,6 +81,10 @@ FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "OMM": Format(_begins(rb"CCSDS_OMM_VERS\s*="), ephemeris="opm:read_omm"),
     "TLE": Format(_begins(rb"(?:[^\n]*\n)?1 [ 0-9A-Z]{5}[ A-Z] .{8} \d\d[ \d]{3}\."), ephemeris="tle:read"),
     "OEM XML": Format(_root(rb"(?:oem|opm|omm|ndm)"), ephemeris="odm_xml:read"),
+    "IOD": Format(_has_line(rb"[ \d]{5} [ \d]{2} [ \d]{3}[A-Z ]{3} \d{4} [A-Z ] \d{8}"), tracking="visual:read_iod"),
+    "UK": Format(_has_line(rb"\d{5}\w{2}\d{10}[ \d]{15}[ \d][1-9][ \d]{8}"), tracking="visual:read_uk"),
+    "RDE": Format(_has_line(rb"\d{4} \d{4} \d\.\d{3} [ \d]{4}[ \r]*\n\d\d?[ \r]*\n"), tracking="visual:read_rde"),
+    "frequencies": Format(_FREQUENCIES, tracking="radio:read"),
     TABLE: Format(table_header.looks, tracking="table:read"),
 }
 

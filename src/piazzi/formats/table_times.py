@@ -35,6 +35,9 @@ def clocks(cells: Cells, told: Conventions) -> Times:
     place = _places(cells)
     if cells.dates is not None:
         return _dates(cells, told)
+    if TIME not in cells.numbers and WEEK not in cells.numbers:
+        name = next(name for name in cells.numbers if name.startswith(TIME))
+        raise ValueError(f"column {name[:60]!r} is no time: it is in a scale, as time[UTC], time[MJD UTC] or time[s past DATE]")
     if TIME not in cells.numbers:
         return _past(read_weeks(cells.numbers[WEEK], cells.numbers[SECONDS], place))
     return _seconds(cells, place)
@@ -80,7 +83,8 @@ def _seconds(cells: Cells, place: Callable[[int], str]) -> Times:
     said = next((value.strip() for key, equals, value in pairs if equals and key.strip() == EPOCH), "")
     if not said:
         raise ValueError(
-            "the times are numbers, and no line above the header says past which date, as # epoch = 2016-02-13T16:00:00 UTC"
+            "the times are numbers, and no line above the header says past which date, as # epoch = 2016-02-13T16:00:00 UTC; "
+            'days are time[MJD UTC] or time[JD TDB], as in --columns "time=T[MJD UTC]"'
         )
     epoch, t = Epoch(said), cells.numbers[TIME]
     bad = np.flatnonzero(~np.isfinite(t))

@@ -1,13 +1,15 @@
 """Positions of satellites by visual observers: the IOD, UK and RDE forms of reports.
 
 Sources: G. Lewis, IOD Observation Format Description, 1998, 2002; The Reporting of Satellite Observations, Slough, 1973 (UK);
-R. D. Eberst's abridged form of it (RDE).  Times are of UTC; the epoch of the star chart names the axes.
+R. D. Eberst's abridged form of it (RDE).  Times are of UTC; the epoch of the star chart names the axes.  Reports stand in
+letters and lists with words around them: those are counted, and what looks like a report out of its columns is refused.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from piazzi.formats.conventions import Conventions
@@ -19,6 +21,14 @@ from piazzi.formats.rows import Row, Rows
 _EPOCHS = {"1": "B1855", "2": "B1875", "3": "B1900", "4": "B1950", "5": "EME2000", "6": "J2050"}
 _UNITS = {"s": 3600.0, "m": 60.0, "d": 1.0}  # of the last figures of an angle, to the degree
 _WITHOUT = "reports without a position"
+_TEXT = "lines of text between reports"
+_END = "999"  # of a list
+_IOD = re.compile(r"[ \d]{5} [ \d]{2} [ \d]{3}[A-Z ]{3} \d{4} [A-Z ] \d{8}")
+_UK = re.compile(r"\d{5}\w{2}\d{10}")
+_RDE = re.compile(r"\d{4} \d{4} \d\.\d{3} [ \d]{4}$")
+_POSITION = re.compile(r"\d\d\s*[-+]\s*\d|\d{4}")
+_DAMAGED = re.compile(r"\d{6,7}\s?[-+]\d{4}|(?<!\d)\d{14,}")  # a position, or a date with a time
+_BLANK = (40, 43, 46, 61)  # between the parts of an IOD report
 
 
 class _Angles(NamedTuple):
@@ -40,24 +50,41 @@ _CODES = {
 
 def read_iod(data: bytes, name: str, told: Conventions) -> Observations:
     """Positions of IOD reports; ValueError with file, line and reason."""
-    return _read(data, name, _iod)
+    return _read(data, name, _IOD, _iod)
 
 
 def read_uk(data: bytes, name: str, told: Conventions) -> Observations:
     """Positions of UK reports; ValueError with file, line and reason."""
-    return _read(data, name, _uk)
+    return _read(data, name, _UK, _uk)
 
 
-def _read(data: bytes, name: str, take: object) -> Observations:
-    assert callable(take)
+def _read(data: bytes, name: str, begins: re.Pattern[str], take: Callable[[Rows, str, int], None]) -> Observations:
     rows, line = Rows(), 0
     try:
-        for line, text in enumerate(data.decode("latin-1").split("\n"), 1):
-            if text.strip():
-                take(rows, text.rstrip(), line)
+        for line, text in _lines(data):
+            if begins.match(text):
+                take(rows, text, line)
+            else:
+                _words(rows, text)
         return _table(rows, name)
     except ValueError as error:
         raise ValueError(f"{name}: line {line}: {error}") from None
+
+
+def _lines(data: bytes) -> Iterator[tuple[int, str]]:
+    """Lines with anything in them, and their numbers."""
+    for line, text in enumerate(data.decode("latin-1").split("\n"), 1):
+        if text.strip():
+            yield line, text.rstrip()
+
+
+def _words(rows: Rows, text: str) -> None:
+    """Count a line between reports; raises ValueError where it looks like a report that is out of its columns."""
+    if text.strip() == _END:
+        return
+    if not text.startswith("#") and _DAMAGED.search(text):
+        raise ValueError(f"{text.strip()[:40]!r} looks like a report, and does not stand in its columns; put # before remarks")
+    rows.skip(_TEXT)
 
 
 def _table(rows: Rows, name: str) -> Observations:
@@ -127,9 +154,12 @@ def _segment(rows: Rows, kinds: tuple[str, str], epoch: str) -> int:
 
 def _iod(rows: Rows, text: str, line: int) -> None:
     text = text.ljust(64)
-    if not text[47:61].strip():
+    if not _POSITION.search(text[43:61]):
         rows.skip(_WITHOUT)
         return
+    for at in _BLANK:
+        if text[at] != " ":
+            raise ValueError(f"column {at + 1} has {text[at]!r} where there is a blank between two parts of a report")
     angles = _CODES.get(text[44])
     if angles is None:
         raise ValueError(f"angle format {text[44]!r} in column 45 is not known; there are {', '.join(_CODES)}")
@@ -150,19 +180,20 @@ def _year(text: str) -> int:
 def _uk(rows: Rows, text: str, line: int) -> None:
     text = text.ljust(80)
     angles = _CODES.get(text[33])
-    if angles is None or angles.kinds != _EQUATOR:
-        raise ValueError(f"coordinate system {text[33]!r} in column 34 is not read; 1, 2 and 3 are")
     if not text[34:50].strip():
         rows.skip(_WITHOUT)
         return
+    if angles is None or text[33] == "7":
+        raise ValueError(f"coordinate system {text[33]!r} in column 34 is not read; 1 to 6 are")
     day = calendar_day(_year(text[11:13]), integer(text[13:15], "month"), integer(text[15:17], "day"))
     row = Row(
-        day, _of_day(text[17:27]), text[7:11].strip(), cospar(text[:7].strip()), _segment(rows, _EQUATOR, text[54]), line,
+        day, _of_day(text[17:27]), text[7:11].strip(), cospar(text[:7].strip()), _segment(rows, angles.kinds, text[54]), line,
         time_sigma=_shifted(text[27:32], 1, "accuracy of the time"),
     )  # fmt: skip
     points = {"s": 3, "m": 2, "d": 1}
     accuracy = _shifted(text[50:54], points[angles.unit], "accuracy of the position")
-    _add(rows, row, angles, text[34:42], text[42:50], accuracy)
+    second = text[42:50] if angles.kinds == _EQUATOR else text[42:50].lstrip()  # elevations need no sign
+    _add(rows, row, angles, text[34:42], second, accuracy)
 
 
 def _shifted(text: str, whole: int, what: str) -> float:
@@ -184,12 +215,12 @@ def read_rde(data: bytes, name: str, told: Conventions) -> Observations:
     report: list[str] = []
     day = 0
     try:
-        for line, text in enumerate(data.decode("latin-1").split("\n"), 1):
+        for line, text in _lines(data):
             fields = text.split()
-            if not fields:
-                continue
-            if fields == ["999"]:
+            if fields == [_END]:
                 report, day = [], 0
+            elif not report and not _RDE.match(text):
+                _words(rows, text)
             elif not report:
                 report = _report(fields)
             elif len(fields) == 1 and len(fields[0]) <= 2:

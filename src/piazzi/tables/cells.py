@@ -27,7 +27,7 @@ _WORDS = (b"rue", b"RUE", b"alse", b"ALSE")  # true and false are numbers to pan
 PIECE = 2**18  # bytes that are looked at together: what stays in a cache
 LONGEST_DATE = 60
 _PAST = re.compile(r"time ?\[s past ([^\[\]]+)\]")
-_DATE = re.compile(r"\s*(\d{4}-\d|M?JD\s*\d)")
+_DATE = re.compile(r"\s*(\d{4}[-/]\d|M?JD\s*\d)")
 SMALL = 2**19  # bytes for which the careful way takes less time than importing pandas
 
 
@@ -243,7 +243,7 @@ def fast(
         if table[when.column].isna().any():
             return None  # the careful way says in which line a date is missing
         try:
-            dates = as_bytes(table[when.column].to_numpy())
+            dates = as_bytes(when.before + table[when.column].to_numpy())
         except ValueError:
             return None
     return Cells(comments, numbers, named, range(line, line + len(table)), dates, when.scale)
@@ -314,7 +314,7 @@ def parse_rows(
                 if not name:
                     continue
                 if i == when.column:
-                    dates.append(_date(cell, at))
+                    dates.append(when.before + _date(cell, at))
                 elif name in known:
                     index[name].append(known[name].setdefault(_name(cell, name, at), len(known[name])))
                 else:
@@ -330,10 +330,11 @@ def parse_rows(
 
 
 class Dated(NamedTuple):
-    """Which column holds dates, -1 for none, and the scale that its name gives them."""
+    """Which column holds dates, -1 for none, the scale that its name gives them, and what goes before each: MJD or JD."""
 
     column: int
     scale: str | None
+    before: str = ""
 
 
 def dated(header: Sequence[str], first: Sequence[str] | Sequence[bytes]) -> Dated:
@@ -345,6 +346,9 @@ def dated(header: Sequence[str], first: Sequence[str] | Sequence[bytes]) -> Date
     if unit and unit != "s":
         from piazzi.earth.scales import SCALES  # only those wait for it who may have dates
 
+        day, _, scale = unit.upper().rpartition(" ") if " " in unit else (unit.upper(), "", "")
+        if day in ("MJD", "JD") and (not scale or scale in SCALES):
+            return Dated(at, scale or None, day + " ")
         if unit.upper() in SCALES:
             return Dated(at, unit.upper())
     cell = first[at] if at < len(first) else ""
