@@ -1,6 +1,4 @@
-"""Files of stations: TOML, SINEX, eccentricities, observatory codes of the Minor Planet Center and lists of the sites of
-visual observers, told apart by content.
-"""
+"""Files of stations: TOML, SINEX, eccentricities, observatory codes, sites of observers of satellites, told apart by content."""
 
 from __future__ import annotations
 
