@@ -1,4 +1,4 @@
-"""Files of stations: TOML, SINEX, eccentricities, observatory codes, sites of observers of satellites, told apart by content."""
+"""Files of stations: TOML, SINEX, eccentricities, observatory codes, sites of satellite observers, told apart by content."""
 
 from __future__ import annotations
 
