@@ -235,6 +235,15 @@ def test_the_station_delay_that_is_left_is_applied_once(tmp_path):
     assert pz.formats.corrected(once).value[0] == once.value[0]
 
 
+def test_reflectors_on_the_moon_have_fewer_numbers(tmp_path):
+    path = crd(tmp_path, flags="0 0 0 1 0", rows="11 86390.5 2.660923125349 0902 2 120.0 9 35.1")
+    text = path.read_text().replace("H3 lageos1    7603901  1155 8820     0 1 1", "h3 apollo15        103  103          0 2")
+    path.write_text(text)
+    table = pz.read_tracking(path)
+    assert table.objects == ("apollo15",)
+    np.testing.assert_allclose(table.value, 299792458.0 * 2.660923125349 / 2, rtol=1e-14)
+
+
 def test_designators():
     codes = {
         "9207002": "1992-070B",

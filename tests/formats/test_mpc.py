@@ -102,6 +102,18 @@ def test_radar(tmp_path):
     np.testing.assert_allclose(table.sigma, [2.5e-6, 5.0])
 
 
+def test_radar_whose_frequency_is_whole_megahertz(tmp_path):
+    """The columns of the magnitude have digits of the frequency and of the station then."""
+    head = "00433".ljust(14) + "R" + "1992 12 02.902778"
+    first = (head + "   4218031212  " + "-     1235147  " + " 8510 " + "253").ljust(77) + "252"
+    second = (head.replace("R", "r") + "C" + "         0650 " + "          052  ").ljust(68) + "253".ljust(9) + "252"
+    table = pz.read_tracking(mpc(tmp_path, first, second))
+    np.testing.assert_allclose(table.value, [42.18031212, -12351.47], rtol=1e-12)
+    np.testing.assert_allclose(table.sigma, [0.65e-6, 0.52])
+    assert np.isnan(table.extra["magnitude"]).all() and set(table.extra["catalogue"]) == {""}
+    assert dict(table.segments[0].frequencies)["transmit"] == 8510e6 and table.segments[0].path == ("253", "(433)", "252")
+
+
 @pytest.mark.parametrize(
     "lines, what",
     [
@@ -238,6 +250,20 @@ def test_ades_radar(tmp_path):
     (segment,) = table.segments
     assert segment.path == ("251", "(433)", "253") and dict(segment.frequencies)["transmit"] == 2380e6
     assert dict(segment.said)["echo"] == "centre of mass"
+
+
+def test_ades_radar_between_strokes(tmp_path):
+    path = tmp_path / "r.psv"
+    path.write_text("""# version=2017
+permID |trx |rcv |obsTime                |doppler    |delay       |rmsDoppler|rmsDelay|com|frq
+    433|253 |253 |1992-12-02T21:40:00.02Z|           | 42.18031212|          | 0.650  |  1|8510.
+    433|253 |252 |1992-12-02T21:40:00.02Z|-12351.47  |            | 0.52     |        |  1|8510.
+""")
+    table = pz.read_tracking(path)
+    assert table.kinds == ("time_of_flight", "doppler") and table.stations == ("253", "252")
+    np.testing.assert_allclose(table.value, [42.18031212, -12351.47], rtol=1e-14)
+    np.testing.assert_allclose(table.sigma, [0.65e-6, 0.52])
+    assert [segment.way for segment in table.segments] == ["two-way", "three-way"]
 
 
 def test_ades_observers_that_move_and_offsets_from_stars(tmp_path):

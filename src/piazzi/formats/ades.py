@@ -85,8 +85,8 @@ def read_xml(data: bytes, name: str, told: Conventions) -> Observations:
 
 
 def _columns(cells: list[str]) -> list[str]:
-    if "obsTime" not in cells or "stn" not in cells:
-        raise ValueError("no line names the columns: obsTime, stn, ra, dec and more, between |")
+    if "obsTime" not in cells or {"stn", "rcv"}.isdisjoint(cells):
+        raise ValueError("no line names the columns: obsTime, stn (rcv of radar), ra, dec and more, between |")
     if len(set(cells)) < len(cells):
         raise ValueError("two columns have the same name")
     return cells

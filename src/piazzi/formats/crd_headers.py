@@ -96,7 +96,9 @@ def read_station(fields: Sequence[str]) -> Station:
 
 
 def read_target(fields: Sequence[str]) -> Target:
-    """H3."""
+    """H3; a target that has no SIC, or no NORAD number, as reflectors on the Moon, may have neither 0 nor na there."""
+    if len(fields) in (5, 6) and all(len(text) == 1 and text.isdecimal() for text in fields[-2:]):
+        fields = [*fields[:-2], *("" for _ in range(7 - len(fields))), *fields[-2:]]
     if len(fields) < 7:
         raise ValueError(f"H3 has {len(fields)} fields; it needs target, COSPAR, SIC, NORAD, time scale and class")
     return Target(fields[1], cospar(fields[2]), fields[3], fields[4], fields[6] in ("3", "4"))

@@ -94,15 +94,19 @@ def _row(rows: Rows, text: str, line: int, place: int = -1) -> Row:
 
 def _notes(text: str, place_axes: str = "") -> dict[str, object]:
     brightness = text[65:70].strip()
-    return {
+    return _unseen(text) | {
         "magnitude": number(brightness, "magnitude") if brightness else math.nan,
         "band": text[70].strip(),
         "catalogue": text[71].strip(),
-        "note": text[13].strip(),
-        "technique": text[14].strip(),
         "reference": text[72:77].strip(),
         "place_axes": place_axes,
     }
+
+
+def _unseen(text: str) -> dict[str, object]:
+    """Notes of what no telescope saw: the columns of magnitude and catalogue have numbers of the radar."""
+    notes: dict[str, object] = dict.fromkeys(EXTRA, "")
+    return notes | {"magnitude": math.nan, "note": text[13].strip(), "technique": text[14].strip()}
 
 
 def sexagesimal(text: str, what: str) -> tuple[float, float]:
@@ -187,8 +191,7 @@ def _radar(rows: Rows, first: str, second: str, line: int) -> None:
         frequencies=(("transmit", 1e6 * megahertz),),
         said=(("echo", point),),
     )
-    row, notes = Row(day, seconds, receiver, target, segment, line), _notes(first) | {"magnitude": math.nan, "band": ""}
-    notes |= {"catalogue": "", "reference": ""}
+    row, notes = Row(day, seconds, receiver, target, segment, line), _unseen(first)
     delay, doppler = _fixed(first[32:47], "delay"), _fixed(first[47:62], "Doppler shift")
     if math.isnan(delay) and math.isnan(doppler):
         raise ValueError("a radar observation without delay and Doppler shift")
