@@ -50,7 +50,8 @@ def test_a_direction_with_one_angle_has_the_other_missing():
         (["right_ascension", "declination"], {}, "--angles"),
         (["range_rate_averaged"] * 2, {"way": "two-way", "range_is": "half"}, "--interval"),
         (["range_rate_averaged"] * 2, {"way": "two-way", "range_is": "half", "interval": 10.0}, "--interval-reference"),
-        (["doppler"] * 2, {}, "doppler is not determined from yet"),
+        (["doppler"] * 2, {}, "Doppler shifts of a path that the file does not say"),
+        (["doppler"] * 2, {"way": "two-way"}, "at which frequency Doppler shifts were measured"),
     ],
 )
 def test_what_is_open_is_asked_for(kinds, told, says):

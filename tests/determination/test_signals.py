@@ -101,8 +101,8 @@ def test_received_frequencies():
     ("given", "words"),
     [
         (rows("range", np.full(4, 1e6), 10.0, way="three-way", range_is="sum"), "which station sent"),
-        (rows("receive_frequency", np.full(4, 1e9), 1.0, way="two-way"), "frequencies of two-way signals"),
-        (rows("pseudorange", np.full(4, 2e7), 1.0), "pseudorange is not determined from yet"),
+        (rows("receive_frequency", np.full(4, 1e9), 1.0, way="two-way"), r"which frequency was sent \(TRANSMIT_FREQ\)"),
+        (rows("pseudorange", np.full(4, 2e7), 1.0), r"where was A\? Give orbits and clocks with --participant"),
     ],
 )  # fmt: skip
 def test_what_is_not_taken_is_refused_by_name(given, words):

@@ -79,6 +79,10 @@ class Case:
     )
     from_: Any = said(None, "DATE", "From when on measurements are new to --prior, where it does not say.", read.instant)
     stations: Any = said(None, "FILE", "Stations: SINEX, TOML, ilrs, mpc; may be repeated.", many=True, usual=True, file=True)
+    participant: Any = said(
+        None, "NAME=FILE", "Another satellite that took part, by its orbit; FILE alone (SP3) gives all in it; may be repeated.",
+        many=True, file=True,
+    )  # fmt: skip
     with_: Any = said(
         None,
         "ESTIMATOR",

@@ -118,6 +118,9 @@ def _beside(name: str, value: Any, folder: Path) -> Any:
         return value
     if isinstance(value, list):
         return [_beside(name, one, folder) for one in value]
+    if name == "participant" and isinstance(value, str) and "=" in value:
+        who, _, path = value.partition("=")
+        return f"{who}={_beside(name, path, folder)}"
     there = isinstance(value, str) and "\0" not in value and len(value) < LONGEST_PATH and (folder / value).is_file()
     return str(folder / value) if there else value
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from piazzi.determination.sites import matched
 from piazzi.earth import StationList
-from piazzi.formats import Observations, Segment
+from piazzi.earth.constants import SPEED_OF_LIGHT
+from piazzi.formats import TAGS, Observations, Segment
 from piazzi.formats.corrections import ADDED, corrected
 
 DELAY = "station delay"
+TIMED = ("transmit", "receive")
 
 
 def with_corrections(observations: Observations, sites: StationList | None) -> tuple[Observations, tuple[str, ...]]:
@@ -34,9 +40,59 @@ def with_corrections(observations: Observations, sites: StationList | None) -> t
         done = corrected(observations)
     except ValueError as error:
         raise ValueError(f"{where}{error}") from None
+    done, clocks = _by_clocks(done)
+    done, delays = _without_delays(done)
     waiting = [(c.name, c.value) for s in observations.segments for c in s.corrections if c.applied is False and c.value]
     names = dict.fromkeys(name for name, _ in waiting if name in ADDED)
-    return done, tuple(f"the correction of {name} that the file states is added: it is not applied there" for name in names)
+    added = [f"the correction of {name} that the file states is added: it is not applied there" for name in names]
+    return done, (*added, *clocks, *delays)
+
+
+def _by_clocks(observations: Observations) -> tuple[Observations, tuple[str, ...]]:
+    """Times of rows by clocks that are right, where the file says by how much those of the stations are ahead.
+
+    A bias goes on from its time with the last drift that was given, as far as the next one, or linearly where there is none.
+    """
+    t, said = observations.t.copy(), []
+    for station in np.unique(observations.station[observations.of_kind("clock_bias")]).tolist():
+        own = observations.station == station
+        tables = []
+        for kind in ("clock_bias", "clock_drift"):
+            there = np.flatnonzero(own & observations.of_kind(kind))
+            there = there[np.argsort(observations.t[there], kind="stable")]
+            tables.append((observations.t[there], observations.value[there]))
+        (times, biases), (changes, drifts) = tables
+        rows = own & observations.measured
+        ahead = np.interp(observations.t[rows], times, biases)
+        if len(changes):
+            k = np.maximum(np.searchsorted(times, observations.t[rows], side="right") - 1, 0)
+            d = np.maximum(np.searchsorted(changes, observations.t[rows], side="right") - 1, 0)
+            ahead = biases[k] + drifts[d] * (observations.t[rows] - times[k])
+        t[rows] -= ahead
+        name = observations.participants[station]
+        said.append(f"times of {name} are less its clock's bias, {ahead.mean():.3g} s, which the file states")
+    return (replace(observations, t=t), tuple(said)) if said else (observations, ())
+
+
+def _without_delays(observations: Observations) -> tuple[Observations, tuple[str, ...]]:
+    """Ranges without the delays of participants that the file states, and times of when signals pass the antennas."""
+    t, value, said = observations.t.copy(), observations.value.copy(), []
+    for i, segment in enumerate(observations.segments):
+        delays = dict(segment.delays)
+        path = segment.path or ()
+        if not any(delays.values()) or not path:
+            continue
+        rows = (observations.segment == i) & observations.measured
+        sends, receives = delays.get(f"transmit {path[0]}", 0.0), delays.get(f"receive {path[-1]}", 0.0)
+        within = sum(delays.get(f"{event} {name}", 0.0) for name in path[1:-1] for event in TIMED)
+        total = sends + receives + within
+        legs = 1.0 if segment.range_is == "sum" or len(path) == 2 else 0.5
+        for kind, factor in (("range", legs * SPEED_OF_LIGHT), ("time_of_flight", 1.0)):
+            value[rows & observations.of_kind(kind)] -= factor * total
+        tags = np.array([TAGS[tag] for tag in observations.tag[rows]])
+        t[rows] += np.where(tags == "transmit", sends, np.where(tags == "receive", -receives, 0.0))
+        said.append(f"delays of {', '.join(path)} that the file states, {total:.3g} s together, are taken off ranges and times")
+    return (replace(observations, t=t, value=value), tuple(dict.fromkeys(said))) if said else (observations, ())
 
 
 def _delayed(segment: Segment) -> str:

@@ -29,7 +29,9 @@ from piazzi.determination.initial import initial_orbits
 from piazzi.determination.initial_result import InitialOrbits
 from piazzi.determination.instruments import with_instruments
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
+from piazzi.determination.partners import Partner, partners_of, with_partners
 from piazzi.determination.products import check_writable
+from piazzi.determination.pseudoranges import positions
 from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.determination.setup import Setup, at_last_used, posed, setup
@@ -59,6 +61,7 @@ def determine(
     prior: Any = None,
     from_: Any = None,
     stations: Any = None,
+    participant: Any = None,
     with_: Any = None,
     forces: Any = None,
     estimate: Any = None,
@@ -88,6 +91,8 @@ def determine(
         covariances, two-line elements; measurements that it has used already are left out
     from_ : date from which on measurements are new to that prior, where it does not say it
     stations : files, `earth.Station` objects or a `StationList`; "ilrs" are those of the package
+    participant : other satellites that took part and whose orbits are given: ``"NAME=FILE"``, files (of all their objects, such
+        as an SP3 of navigation satellites), or a mapping from names to files or ephemerides
     with_ : estimators, as the command line writes them; the first is the answer.  Default the graph.
     forces : "default" (by height, as without it), "none", text such as ``"gravity=EGM2008 degree=40 drag=exponential"``, or
         `earth.Forces`
@@ -167,9 +172,10 @@ def fitting_orbits(*tracking: Any, case: Case | None = None, **words: Any) -> In
 def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[[Guess], Chosen], Guess | None, Earlier | None]:
     """What was measured, the forces on an orbit, where to begin where somebody says it, and the orbit of before."""
     wanted, burns = asked(case.estimate, case.consider), burns_of(case.manoeuvre)
-    rows = of_object(observations_of(files, case.answers), case.object)
+    partners = partners_of(case.participant)
+    rows = of_object(with_partners(observations_of(files, case.answers), partners), case.object)
     rows, earlier = _beside_prior(rows, case)
-    seen, begin = _seen(rows, case, earlier, any(one.what.kind == CLOCK for one in wanted))
+    seen, begin = _seen(rows, case, earlier, any(one.what.kind == CLOCK for one in wanted), partners)
     seen = with_instruments(seen, [one for one in wanted if one.what.kind in INSTRUMENTS])
 
     def chosen(orbit: Guess) -> Chosen:
@@ -197,7 +203,9 @@ def _beside_prior(rows: Observations, case: Case) -> tuple[Observations, Earlier
     return fresh(rows, earlier, since), earlier
 
 
-def _seen(rows: Observations, case: Case, earlier: Earlier | None, clocks: bool) -> tuple[Measured, Guess | None]:
+def _seen(
+    rows: Observations, case: Case, earlier: Earlier | None, clocks: bool, partners: Mapping[str, Partner]
+) -> tuple[Measured, Guess | None]:
     """What was measured, by the centre that the user, the guess or the measurements say; and the guess where there is one."""
 
     def by(about: str) -> Measured:
@@ -211,6 +219,7 @@ def _seen(rows: Observations, case: Case, earlier: Earlier | None, clocks: bool)
             name=case.object,
             about=about,
             antenna=case.antenna,
+            partners=partners,
         )
 
     seen = by(case.about or "earth")
@@ -225,7 +234,7 @@ def _seen(rows: Observations, case: Case, earlier: Earlier | None, clocks: bool)
 
 def objects_in(tracking: Sequence[Any], case: Case) -> list[str | None]:
     """Names of all objects of files."""
-    return list(observations_of(tracking, case.answers).objects) or [None]
+    return list(with_partners(observations_of(tracking, case.answers), partners_of(case.participant)).objects) or [None]
 
 
 def solved(
@@ -360,7 +369,10 @@ def _guess(given: Any, seen: Measured, chosen: str | None) -> Guess | None:
         return guess_of(given, seen.first, chosen or seen.object or None, seen.about)
     wide = {s.name for s in seen.stations if s.sensor.startswith("position")}
     own = np.isin(seen.tracking.row_stations, list(wide)) & np.isfinite(seen.tracking.values[:, :3]).all(axis=1) if wide else []
-    return from_fixes(seen.epoch, seen.tracking.row_times[own], seen.tracking.values[own, :3]) if np.any(own) else None
+    if not np.any(own):
+        found = from_fixes(seen.epoch, *positions(seen.stations, seen.tracking))
+        return None if found is None else replace(found, source="the pseudoranges")
+    return from_fixes(seen.epoch, seen.tracking.row_times[own], seen.tracking.values[own, :3])
 
 
 def plain_command(words: Sequence[str]) -> str:

@@ -18,11 +18,15 @@ from piazzi.problem.checks import Array
 
 GEOCENTRE = "500"  # of the Minor Planet Center: reduced to the centre of the Earth
 AZEL, RADEC = ("azimuth", "elevation"), ("right_ascension", "declination")
+XEYN, XSYE = ("x_east", "y_north"), ("x_south", "y_east")
+MOUNTS = {"azel": AZEL, "xeyn": XEYN, "xsye": XSYE}  # as `sensors.azimuth_elevation` calls them
 
 
-def azimuths(context: Context, index: Array) -> Sequence[Part]:
-    """Rows of azimuth and elevation as parts, one for each station, segment and pass."""
-    return [_part(context, rows, AZEL) for rows in passes(context, index)]
+def mounts(context: Context, index: Array) -> Sequence[Part]:
+    """Rows of both angles of a mount as parts, one for each station, segment and pass."""
+    kinds = context.observations.kinds[context.observations.kind[index[0]]]
+    pair = next(pair for pair in MOUNTS.values() if kinds in pair)
+    return [_part(context, rows, pair) for rows in passes(context, index)]
 
 
 def ascensions(context: Context, index: Array) -> Sequence[Part]:
@@ -38,25 +42,28 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
     if observations.place[index].max() >= 0:
         raise ValueError(f"{context.where}directions from observers that move are not determined from yet")
     number = int(observations.station[first])
-    site = None if number >= 0 and observations.participants[number] == GEOCENTRE else context.site(number)
+    partner = context.partner(number)
+    nowhere = partner is not None or (number >= 0 and observations.participants[number] == GEOCENTRE)
+    site = None if nowhere else context.site(number)
     tag = EVENTS[TAGS[observations.tag[first]] or segment.tag or "bounce"]
-    if kinds == AZEL:
+    if kinds != RADEC:
         if site is None or context.about == "sun":
             raise ValueError(f"{context.where}azimuths and elevations are of stations, of an orbit about the Earth")
         bent = "radio" if context.open else None
         if not context.open:
             context.said["azimuths and elevations are free of refraction (--corrections open says otherwise)"] = None
-        sensor = _azimuth(tag, bent, context.clocks)
+        sensor = _mount(next(m for m, pair in MOUNTS.items() if pair == kinds), tag, bent, context.clocks)
     else:
         if segment.angles is None:
             raise ValueError(f"{context.where}what are the directions? --angles astrometric, geocentric or apparent")
         sensor = _ascension(segment.angles, frame_named(segment.frame or "GCRF"), tag, context.clocks, context.about)
-    if site is None or context.about == "sun":
-        place = Place(site, context.epoch, about=context.about)
-        given = sensor.at(None, context.epoch, 1.0, name=GEOCENTRE if site is None else site.name, place=place)
+    if site is None and partner is None:
+        place = Place(None, context.epoch, about=context.about)
+        given = sensor.at(None, context.epoch, 1.0, name=GEOCENTRE, place=place)
     else:
-        weather = weather_of(observations, index, site, context.epoch)[0]
-        given = sensor.at(site, context.epoch, 1.0, weather=weather)
+        weather = weather_of(observations, index, site, context.epoch)[0] if site and context.about == "earth" else None
+        given, usable = context.placed(sensor, index, weather)
+        rows = rows[np.isin(rows.max(axis=1), usable)]
     there = rows >= 0
     values = np.where(there, observations.value[rows], np.nan)
     sigma = np.where(there, observations.sigma[rows], np.nan)
@@ -87,9 +94,9 @@ def paired(context: Context, index: Array, kinds: tuple[str, ...]) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _azimuth(tag: str, bent: str | None, clocks: bool) -> Any:
-    name = "_".join(["azimuth_elevation", tag, *([bent] if bent else [])])
-    return sensors.azimuth_elevation(name=name, tag=tag, refraction=bent, time_bias=clocks)
+def _mount(mount: str, tag: str, bent: str | None, clocks: bool) -> Any:
+    name = "_".join(["azimuth_elevation" if mount == "azel" else mount, tag, *([bent] if bent else [])])
+    return sensors.azimuth_elevation(name=name, mount=mount, tag=tag, refraction=bent, time_bias=clocks)
 
 
 @lru_cache(maxsize=64)

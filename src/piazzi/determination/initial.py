@@ -170,7 +170,7 @@ def _apart(problem: Problem, tracking: Tracking, modes: tuple[OrbitMode, ...], c
     away = np.linalg.norm(paths[0] - paths[1], axis=1)
     best: Parting | None = None
     for station in problem.stations:
-        if station.place is None:
+        if not hasattr(station.place, "at"):  # none, or one in orbit, which is not known so far ahead
             continue
         place, _ = observers(problem.epoch, station, t)
         lines = [p - place for p in paths]

@@ -10,10 +10,13 @@ import numpy as np
 
 from piazzi.determination.centres import Centre, centre_of
 from piazzi.determination.correcting import with_corrections
-from piazzi.determination.directions import AZEL, RADEC, ascensions, azimuths
+from piazzi.determination.differences import differences
+from piazzi.determination.directions import AZEL, RADEC, XEYN, XSYE, ascensions, mounts
 from piazzi.determination.fixes import fixes
 from piazzi.determination.frequencies import frequencies
 from piazzi.determination.parts import Part
+from piazzi.determination.phases import phases
+from piazzi.determination.pseudoranges import pseudoranges
 from piazzi.determination.ranging import ranges
 from piazzi.determination.rates import rates
 from piazzi.determination.sites import Context, sites_of, with_station_sigmas
@@ -28,12 +31,22 @@ MOST_SIGMAS = 200  # different noise matrices of one station and sensor; beyond,
 # kinds of rows, and what makes parts of all rows of these kinds; who takes a kind takes it from all stations
 MAKERS: Mapping[tuple[str, ...], Callable[[Context, Array], Sequence[Part]]] = {
     ("x", "y", "z", "vx", "vy", "vz"): fixes,
-    ("range",): ranges,
-    AZEL: azimuths,
+    ("range", "time_of_flight"): ranges,
+    AZEL: mounts,
+    XEYN: mounts,
+    XSYE: mounts,
     RADEC: ascensions,
-    ("range_rate", "range_rate_averaged"): rates,
+    ("range_rate", "range_rate_averaged", "doppler"): rates,
     ("receive_frequency",): frequencies,
+    ("receive_phase", "doppler_count"): phases,
+    ("pseudorange",): pseudoranges,
+    ("delta_range_delay", "vlbi_delay"): differences,
 }
+SILENT = (
+    "magnitude", "radar_cross_section", "carrier_power", "carrier_to_noise", "ranging_to_noise", "transmit_phase",
+    "troposphere_dry", "troposphere_wet", "total_electron_content",
+)  # fmt: skip
+FROM_THE_SUN = (*RADEC, "time_of_flight", "doppler")  # that are determined from about the Sun
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +103,7 @@ def measured(
     about: str = "earth",
     antenna: tuple[float, float, float] | None = None,
     epoch: Epoch | None = None,
+    partners: Mapping[str, Any] | None = None,
 ) -> Measured:
     """Sensors, stations and tracking of observations of one object.
 
@@ -104,6 +118,7 @@ def measured(
     about : what the orbit goes about
     antenna : where fixes are taken, m from the centre of mass along R, T and N
     epoch : time zero of the problem; default the second in which the first row is
+    partners : participants in orbit whose ephemerides are given, by name; see `partners.partners_of`
 
     Raises
     ------
@@ -121,6 +136,7 @@ def measured(
     unused = int(np.count_nonzero(everything.measured & ~everything.used))
     if unused:
         left_out["rows that the file says are not to be used"] = unused
+    left_out |= {f"rows of {words}, which say nothing of the orbit": n for words, n in _silent(everything).items()}
     order = np.argsort(everything.t, kind="stable")
     index = order[usable[order]]
     if not len(index):
@@ -130,9 +146,13 @@ def measured(
     known = everything.objects
     own = known[0] if known else name or ""
     context = Context(
-        everything, epoch, sites, own, com, corrections == "applied", corrections == "open", clocks, about, antenna
-    )
-    parts = _parts(context, index)
+        everything, epoch, sites, own, com, corrections == "applied", corrections == "open", clocks, about, antenna,
+        partners or {},
+    )  # fmt: skip
+    parts = [part for part in _parts(context, index) if len(part.t)]
+    left_out |= context.left
+    if not parts:
+        raise ValueError(f"{_where(everything)}there is no measurement to use: {', '.join(context.left)}")
     sensors, places, names, labels = _stations(parts)
     times = np.concatenate([part.t for part in parts]) + (everything.epoch - epoch)
     width = max(part.values.shape[1] for part in parts)
@@ -142,6 +162,8 @@ def measured(
     tracking = Tracking(times[by_time], values[by_time], np.array(names)[by_time], epoch=epoch)
     in_order = bool(np.all(everything.t[1:] >= everything.t[:-1]))
     sorted_ = () if in_order else ("rows were out of order, and are sorted by time",)
+    if any(segment.quality == "degraded" for segment in everything.segments):
+        context.said["rows that the file calls degraded are used as the others"] = None
     said = [*everything.assumed, *added, *sorted_, *context.said, *(sites.notes if sites else ())]
     return Measured(
         everything, context.object, sensors, places, tracking, rows[by_time], labels, epoch,
@@ -150,6 +172,12 @@ def measured(
         tuple(dict.fromkeys([*said, *(text for part in parts for text in part.assumed)])),
         left_out, about=about,
     )  # fmt: skip
+
+
+def _silent(observations: Observations) -> dict[str, int]:
+    """How many rows of each kind neither measure the orbit nor help to use those that do."""
+    counts = np.bincount(observations.kind, minlength=len(observations.kinds))
+    return {kind.replace("_", " "): int(n) for kind, n in zip(observations.kinds, counts, strict=True) if n and kind in SILENT}
 
 
 def _check_sigmas(observations: Observations, index: Array) -> None:
@@ -221,10 +249,10 @@ def _parts(context: Context, index: Array) -> list[Part]:
 
 def _only_directions(context: Context, kinds: Array) -> None:
     """Raise ValueError for rows that are not determined from about the Sun."""
-    other = [kind for i, kind in enumerate(context.observations.kinds) if i in kinds and kind not in RADEC]
+    other = [kind for i, kind in enumerate(context.observations.kinds) if i in kinds and kind not in FROM_THE_SUN]
     if other:
         raise ValueError(
-            f"{context.where}{other[0]} is not determined from about the Sun yet; right ascension and declination are"
+            f"{context.where}{other[0]} is not determined from about the Sun yet; directions and echoes of radar are"
         )
 
 

@@ -7,7 +7,7 @@ that stands still along the measured direction.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from piazzi.problem.inputs import wrapped
 
 FAR = 1e7  # m: where a body is put to ask a sensor what it adds
 PLACES = (("position_x", "position_y", "position_z"), ("px", "py", "pz"))
-PAIRS = (("azimuth", "elevation"), ("right_ascension", "declination"))
+PAIRS = (("azimuth", "elevation"), ("x_east", "y_north"), ("x_south", "y_east"), ("right_ascension", "declination"))
 ROUNDS = 3
 
 
@@ -117,11 +117,30 @@ def _of_station(given: Sights, station: Station, t: Array, z: Array, own: Array)
         value = np.zeros((len(t), 3))
         value[:, 0] = z[:, i] - np.where(np.abs(added) < 1e3, added, 0.0)
         out.append(_rows(RANGE, t, stands, velocity, value, np.full((len(t), 2), sigma[i]), own))
-    if "range_rate" in at:
-        value = np.zeros((len(t), 3))
-        value[:, 0] = z[:, at["range_rate"]]
-        out.append(_rows(RATE, t, stands, velocity, value, np.full((len(t), 2), sigma[at["range_rate"]]), own))
+    for name in ("range_rate", "frequency", "returned_frequency"):
+        if name in at:
+            rate, scale, shared = _rates(station, name, t, z[:, at[name]])
+            value = np.zeros((len(t), 3))
+            value[:, 0] = rate
+            rows, which = _rows(RATE, t, stands, velocity, value, np.full((len(t), 2), scale * sigma[at[name]]), own)
+            out.append((replace(rows, shared=np.full(len(t), shared)), which))
     return [(rows.of(keep), own[keep]) for rows, keep in ((r, np.isfinite(r.value).all(axis=1)) for r, _ in out) if keep.any()]
+
+
+def _rates(station: Station, name: str, t: Array, z: Array) -> tuple[Array, float, float]:
+    """Range-rates that measurements mean, how many m/s a unit of these is, and 1 where they share an unknown constant.
+
+    Of a frequency that the satellite sends the carrier is known to a millionth, which is hundreds of m/s.
+    """
+    if name == "range_rate":
+        return z, 1.0, 0.0
+    if name == "frequency":
+        sent = float(np.nanmedian(z))
+        return SPEED_OF_LIGHT * (1.0 - z / sent), SPEED_OF_LIGHT / sent, 1.0
+    known: Any = station.numbers
+    sent = known["turnaround"] * (known["transmit_frequency"] + known["transmit_rate"] * (t - known["since"]))
+    scale = SPEED_OF_LIGHT / 2.0
+    return scale * (1.0 - z / sent), scale / float(np.median(sent)), 0.0
 
 
 def _rows(
@@ -154,6 +173,9 @@ def _fixes(
 def observers(epoch: Epoch, station: Station, t: Array) -> tuple[Array, Array]:
     """Position and velocity (K, 3) of a station on the axes of the problem."""
     recipe: Any = station.place
+    if not hasattr(recipe, "at"):  # in orbit: a table of both
+        found = np.array([recipe.value(float(x)) for x in t])
+        return found[:, :3], found[:, 3:]
     half = 0.5
     before, here, after = (recipe.at([epoch + float(v) for v in t + shift]) for shift in (-half, 0.0, half))
     return here, (after - before) / (2 * half)
@@ -169,10 +191,10 @@ def _directions(
         return out
     t, z, place = t[good], z[good], place[good]
     lon, lat = z[:, at[0]], z[:, at[1]]
-    if pair[0] == "azimuth":  # noqa: SIM108
-        u = _from_horizon(given, station, t, lon, lat)
-    else:
+    if pair[0] == "right_ascension":
         u = _from_the_equator(given, station, t, lon, lat)
+    else:
+        u = _from_horizon(given, station, t, lon, lat, pair)
     problem = given.problem
     if problem is None:
         out[good] = u
@@ -203,13 +225,14 @@ def _from_the_equator(given: Sights, station: Station, t: Array, lon: Array, lat
     return np.asarray(u / np.linalg.norm(u, axis=1)[:, None])
 
 
-def _from_horizon(given: Sights, station: Station, t: Array, azimuth: Array, elevation: Array) -> Array:
-    """Directions on the axes of the GCRF, from north through east and up."""
+def _from_horizon(given: Sights, station: Station, t: Array, first: Array, second: Array, pair: tuple[str, str]) -> Array:
+    """Directions on the axes of the GCRF: azimuths go from north through east and up, other mounts from the zenith."""
     turn, (east, north, up) = _horizon(given, station, t)
+    begin, towards, pole = {"azimuth": (north, east, up), "x_east": (up, east, north), "x_south": (up, -north, east)}[pair[0]]
     local = (
-        (np.cos(elevation) * np.sin(azimuth))[:, None] * east
-        + (np.cos(elevation) * np.cos(azimuth))[:, None] * north
-        + np.sin(elevation)[:, None] * up
+        (np.cos(second) * np.sin(first))[:, None] * towards
+        + (np.cos(second) * np.cos(first))[:, None] * begin
+        + np.sin(second)[:, None] * pole
     )
     return np.asarray((turn @ local[..., None])[..., 0])
 
@@ -226,10 +249,10 @@ def _horizon(given: Sights, station: Station, t: Array) -> tuple[Array, tuple[Ar
 
 def _pole(given: Sights, station: Station, t: Array, pair: tuple[str, str]) -> Array:
     """Unit vectors (K, 3) towards which the second angle grows."""
-    if pair[0] != "azimuth":
+    if pair[0] == "right_ascension":
         return np.tile([0.0, 0.0, 1.0], (len(t), 1))
-    turn, (_, _, up) = _horizon(given, station, t)
-    return np.asarray(turn @ up)
+    turn, (east, north, up) = _horizon(given, station, t)
+    return np.asarray(turn @ {"azimuth": up, "x_east": north, "x_south": east}[pair[0]])
 
 
 def _frame(u: Array, pole: Array, pair: tuple[str, str]) -> tuple[Array, Array]:

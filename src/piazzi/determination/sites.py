@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from piazzi.earth import Epoch, Station, StationList, Weather, ilrs_stations, mpc_stations, read_stations
+from piazzi.earth import Epoch, Place, Station, StationList, Weather, ilrs_stations, mpc_stations, read_stations
 from piazzi.formats import Observations
 from piazzi.problem.checks import Array
 from piazzi.text import nearest
 
+ABOARD = "aboard"  # column of rows that the object itself received
 OWN = {"ilrs": ilrs_stations, "mpc": mpc_stations}  # lists of stations that have a name
 
 
@@ -33,6 +34,8 @@ class Context:
     clocks : whether sensors have a number that times are late by
     about : what the orbit goes about
     antenna : where fixes are taken, m from the centre of mass along R, T and N, where the user says it
+    partners : participants in orbit whose ephemerides are given, by name
+    left : reasons and counts of rows that makers leave out
     """
 
     observations: Observations
@@ -45,6 +48,8 @@ class Context:
     clocks: bool = False
     about: str = "earth"
     antenna: tuple[float, float, float] | None = None
+    partners: Mapping[str, Any] = field(default_factory=dict)
+    left: dict[str, int] = field(default_factory=dict)
     said: dict[str, None] = field(default_factory=dict)
 
     def site(self, index: int) -> Station:
@@ -53,6 +58,33 @@ class Context:
         if not name:
             raise ValueError(f"{self.where}the file does not say which station measured: no station can be found for it")
         return station_named(name, self.sites, self.where)
+
+    def partner(self, index: int) -> Any:
+        """The participant in orbit that measured, None where it is a station."""
+        return self.partners.get(self.observations.participants[index]) if index >= 0 else None
+
+    def placed(self, sensor: Any, rows: Array, weather: Weather | None = None, **numbers: Any) -> tuple[dict[str, Any], Array]:
+        """What a station of the problem is made of, for rows of one participant, and which of these can be used.
+
+        Raises
+        ------
+        ValueError
+            For a station that nobody gave, and a participant whose orbit is not known at any of the rows.
+        """
+        index = int(self.observations.station[rows[0]])
+        known = {name: value for name, value in numbers.items() if name in dict(sensor.defaults)}
+        partner = self.partner(index)
+        if partner is None:
+            site = self.site(index)
+            place = None if self.about == "earth" else Place(site, self.epoch, about=self.about)
+            given = sensor.at(None if place else site, self.epoch, 1.0, name=site.name, weather=weather, place=place, **known)
+            return given, rows
+        t = self.observations.t[rows] + (self.observations.epoch - self.epoch)
+        table, usable = partner.place(self.epoch, t)
+        if not usable.all():
+            reason = f"rows when no orbit of {partner.name} is given"
+            self.left[reason] = self.left.get(reason, 0) + int((~usable).sum())
+        return sensor.at(None, self.epoch, 1.0, name=partner.name, place=table, **known), rows[usable]
 
     @property
     def where(self) -> str:
@@ -128,3 +160,9 @@ def with_station_sigmas(observations: Observations, sites: StationList | None) -
             own = np.isnan(sigma) & (observations.station == i) & observations.of_kind(kind)
             sigma[own] = value
     return sigma
+
+
+def aboard(rows: Observations) -> Array:
+    """(J,) mask of rows that the object itself received."""
+    column = rows.extra.get(ABOARD)
+    return np.zeros(len(rows), dtype=bool) if column is None else np.asarray(column, dtype=bool)

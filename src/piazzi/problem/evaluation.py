@@ -93,6 +93,21 @@ def measurement_jacobian(spec: KernelSpec, sensor: int, numbers: Array, m: int, 
     return out[0] if one else out
 
 
+class _Held:
+    """A place that stays where it is first, or last, known at other times: for checks that ask at one time of all stations."""
+
+    def __init__(self, place: Any) -> None:
+        self._place = place
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._place, name)
+
+    def value(self, t: float) -> tuple[float, ...]:
+        """Where it is at the time that is nearest."""
+        span = getattr(self._place, "span", None)
+        return tuple(self._place.value(t if span is None else min(max(t, span[0]), span[1])))
+
+
 def singular_equation(
     model: Model, stations: Iterable[Station], numbers: Mapping[str, float], t: float, functions: Mapping[str, Any]
 ) -> str:
@@ -108,7 +123,7 @@ def singular_equation(
     for station in stations:
         sensor = model.sensor(station.sensor)
         for component, equation in zip(sensor.components, sensor.equations, strict=True):
-            there = dict(functions) | {STATION: station.place}
+            there = dict(functions) | {STATION: _Held(station.place)}
             here = with_values(values | dict(station.numbers), sensor.definitions, functions=there, model=model)
             if not np.isfinite(evaluate(equation, here)):
                 lost = next((d.names[0] for d in sensor.definitions if d.function == ROOT and isnan(here[d.names[0]])), None)
@@ -129,7 +144,7 @@ def check_own_functions(
     here = [(values, model.definitions)]
     for station in stations:
         definitions = model.sensor(station.sensor).definitions
-        there = dict(functions) | {STATION: station.place}
+        there = dict(functions) | {STATION: _Held(station.place)}
         here.append((with_values(values | dict(station.numbers), definitions, functions=there, model=model), definitions))
     for known, call in ((known, call) for known, definitions in here for d in definitions for call in d.calls):
         if call.function in own:

@@ -9,8 +9,8 @@ from typing import Any
 
 from piazzi.earth.forces import STATES, Forces
 from piazzi.earth.sensors.instrument import Instrument, one_of
-from piazzi.earth.sensors.light import C, Light, light, shapiro
-from piazzi.earth.sensors.ray import Ray
+from piazzi.earth.sensors.light import C, Light
+from piazzi.earth.sensors.ray import Ray, ray_of
 from piazzi.earth.sensors.text import AXES, names
 from piazzi.model import Model, Sensor
 from piazzi.model.pruning import used_definitions
@@ -39,18 +39,16 @@ def pseudorange(
     relativity : whether the gravity of the Earth delays the signal (Shapiro)
     biases, parameters : as `range` takes them
     """
-    both = light("two-way", "bounce")
-    up = both.legs[1]
-    ray = Ray(Light(both.definitions, {up.light_time: both.roots[up.light_time]}, (up,)), "t")
-    if relativity:
-        delay, more = shapiro(up)
-        ray.definitions |= more
-        ray.delays.append(delay)
+    ray = ray_of("one-way", "reception", relativity=relativity, aboard=True)
     ray.numbers |= dict.fromkeys(("clock", "clock_rate", "emitter_clock", "emitter_clock_rate"), 0.0)
     value = f"{ray.length} + clock + clock_rate*t - emitter_clock - emitter_clock_rate*t"
     value = ray.biased(value, "pseudorange", biases)
     priors = {"clock": (0.0, 3e5), "clock_rate": (0.0, 3e2)}  # a millisecond, a microsecond a second
-    return ray.instrument(name, {"pseudorange": value}, parameters, units={"pseudorange": "m"}, priors=priors)
+    asked = {*parameters} & {*priors}
+    units = {key: unit for key, unit in (("clock", "m"), ("clock_rate", "m/s")) if key in asked}
+    return ray.instrument(
+        name, {"pseudorange": value}, parameters, units={"pseudorange": "m"}, number_units=units, priors=priors
+    )
 
 
 def satellite_range(

@@ -17,12 +17,14 @@ from piazzi.earth.sensors.turning import EarthVelocity
 
 ANGLES = ("astrometric", "geocentric", "apparent")
 REFRACTION = ("optical", "radio")
+MOUNTS = {"azel": ("azimuth", "elevation"), "xeyn": ("x_east", "y_north"), "xsye": ("x_south", "y_east")}
 
 
 def azimuth_elevation(
     angles: str = "apparent",
     *,
     name: str = "azimuth_elevation",
+    mount: str = "azel",
     tag: str = "reception",
     steps: bool = False,
     refraction: str | None = None,
@@ -31,15 +33,17 @@ def azimuth_elevation(
     parameters: Mapping[str, str] | Sequence[str] = (),
     visible: Sequence[str] = (),
 ) -> Instrument:
-    """A sensor of azimuth, from north through east, and elevation (rad), joint.
+    """A sensor of azimuth, from north through east, and elevation (rad), joint, or of both angles of another mount.
 
     Innovations of the azimuth, and so its noise, are on the sky: times the cosine of the elevation.  A station gives the
-    numbers ``azimuth_bias`` and ``elevation_bias`` (rad).
+    numbers ``azimuth_bias`` and ``elevation_bias`` (rad); of other mounts they are called by their angles.
 
     Parameters
     ----------
     angles : "apparent", or "geocentric": without the aberration by the motion of the station
     name : of the sensor
+    mount : "azel"; "xeyn", whose first angle ``x_east`` goes from the zenith to the east about an axis to the north, to which
+        the second, ``y_north``, goes; or "xsye", ``x_south`` from the zenith to the south, and ``y_east``
     tag : what times of rows are; "bounce" is when a signal leaves the satellite, "transmission" when that of a radar leaves the
         station
     steps, time_bias, biases, parameters, visible : as `range` takes them
@@ -48,24 +52,29 @@ def azimuth_elevation(
     Raises
     ------
     ValueError
-        For angles, a tag or a refraction that there is not.
+        For angles, a mount, a tag or a refraction that there is not.
     """
     one_of(angles, ANGLES[1:], "angles")
+    one_of(mount, list(MOUNTS), "mount")
     ray = _seen(tag, steps, time_bias)
     air = Air()
     air.turn(ray.received, tuple(_sight(ray, angles)))
-    above = "elevation"
+    above, up = "elevation", "look_u"
     if refraction is not None:
         _refract(air, refraction)
-        above = "elevation + bent_refraction"
+        above, up = "elevation + bent_refraction", "lifted"
+        if mount != "azel":
+            air.definitions["lifted"] = f"tan({above})*sqrt(look_e**2 + look_n**2)"
     ray.definitions |= air.definitions
     ray.numbers |= air.numbers
-    equations = {
-        "azimuth": ray.biased("atan2(look_e, look_n)", "azimuth", biases),
-        "elevation": ray.biased(above, "elevation", biases),
-    }
-    kinds = ("azimuth", "elevation")
-    return ray.instrument(name, equations, parameters, visible, angles=kinds, on_sky={"azimuth": "elevation"})
+    texts = {
+        "azel": ("atan2(look_e, look_n)", above),
+        "xeyn": (f"atan2(look_e, {up})", f"atan2(look_n, sqrt(look_e**2 + {up}**2))"),
+        "xsye": (f"atan2(-look_n, {up})", f"atan2(look_e, sqrt(look_n**2 + {up}**2))"),
+    }[mount]
+    kinds = MOUNTS[mount]
+    equations = {kind: ray.biased(text, kind, biases) for kind, text in zip(kinds, texts, strict=True)}
+    return ray.instrument(name, equations, parameters, visible, angles=kinds, on_sky={kinds[0]: kinds[1]})
 
 
 def right_ascension_declination(

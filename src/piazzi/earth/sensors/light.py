@@ -20,12 +20,13 @@ TAGS = ("reception", "bounce", "transmission")
 
 @dataclass(frozen=True)
 class Leg:
-    """A signal between satellite and station: names of its light time, its length and the place of the station."""
+    """A signal between satellite and station: names of its light time, its length and the places; whether it goes up."""
 
     light_time: str
     rho: str
     station: str
     satellite: str
+    upwards: bool = False
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,14 @@ class Light:
 
 
 def light(
-    path: str, tag: str, *, shift: str = "", steps: bool = False, prefix: str = "", transmitter: str = "station"
+    path: str,
+    tag: str,
+    *,
+    shift: str = "",
+    steps: bool = False,
+    prefix: str = "",
+    transmitter: str = "station",
+    aboard: bool = False,
 ) -> Light:
     """The legs of a signal.
 
@@ -56,11 +64,24 @@ def light(
     steps : whether the satellite moves by steps of the dynamics
     prefix : of all names
     transmitter : of a three-way signal, the function that says where its station is
+    aboard : whether the satellite receives, and the station sends or returns what it sent
     """
     sat, down, up, rec, tra = (f"{prefix}{name}" for name in ("sat", "down", "up", "rec", "tra"))
     instant = f"t{_signed(shift)}"
     there = "station" if path != "three-way" else transmitter
-    downward, upward = Leg(down, f"{down}_rho", rec, sat), Leg(up, f"{up}_rho", tra, sat)
+    downward, upward = Leg(down, f"{down}_rho", rec, sat), Leg(up, f"{up}_rho", tra, sat, True)
+    if aboard:
+        back = f"{prefix}back"
+        inward, outward = Leg(down, f"{down}_rho", tra, sat, True), Leg(up, f"{up}_rho", tra, back)
+        order = "" if steps else ", order=2"
+        before = f"at(-{down} - {up}{_signed(shift)}{order})"
+        roots = {
+            down: _root(inward, {names(tra, True): f"station({instant} - {down})"}),
+            up: _root(outward, {names(back, True): before}),
+        }
+        if path == "one-way":
+            del roots[up]
+        return Light(_at_the_tag(sat, shift, steps), roots, (inward, outward)[: len(roots)])
     if path == "one-way" and tag != "reception":
         tag = "bounce"
     if tag == "reception":

@@ -15,7 +15,7 @@ def range(  # noqa: A001
     name: str = "range",
     tag: str = "reception",
     steps: bool = False,
-    relativity: bool = False,
+    relativity: bool | str = False,
     troposphere: str | None = None,
     mapping: str = "niell",
     ionosphere: str | None = None,
@@ -23,6 +23,7 @@ def range(  # noqa: A001
     biases: Mapping[str, str] | Sequence[str] = (),
     parameters: Mapping[str, str] | Sequence[str] = (),
     transmitter: Station | None = None,
+    aboard: bool = False,
     visible: Sequence[str] = (),
 ) -> Instrument:
     """A sensor of range (m): the mean length of the legs, each station and the satellite at its own event.
@@ -37,7 +38,7 @@ def range(  # noqa: A001
     tag : "reception", "bounce" (of one way: when the satellite sends) or "transmission": what times of rows are
     steps : whether the satellite is carried to its event by a step of the dynamics, as beyond the orbit of the Moon, instead of
         by position, velocity and acceleration
-    relativity : whether the gravity of the Earth delays the legs (Shapiro)
+    relativity : whether the gravity of the Earth delays the legs (Shapiro); "sun", that of the Sun, where states are about it
     troposphere : "saastamoinen" for radio, "mendes-pavlis" or "marini-murray" for lasers; the weather is the station's
     mapping : "niell" or "gmf", with "saastamoinen"
     ionosphere : "single-layer" or "klobuchar", whose numbers stations give, with ``frequency`` and ``uplink_frequency`` (Hz)
@@ -46,6 +47,8 @@ def range(  # noqa: A001
     parameters : numbers such as ``range_bias`` that are parameters of the model, estimated, common to its stations; or a
         mapping to other roles
     transmitter : the other station of "three-way"
+    aboard : whether the satellite itself receives, what a station (whose place may be the orbit of another satellite) sends,
+        or returns on two ways; times of rows are those of reception
     visible : when stations measure in simulation: "above" their ``mask`` (rad), "dark", with the Sun below their ``night``
         (rad, default -12 degrees), "sunlit", with the satellite out of the shadow of the Earth; or rules as `Sensor` takes them
 
@@ -54,7 +57,9 @@ def range(  # noqa: A001
     ValueError
         For a path, tag or medium that there is not.
     """
-    ray = ray_of(path, tag, steps=steps, relativity=relativity, time_bias=time_bias, transmitter=transmitter)
+    ray = ray_of(path, tag, steps=steps, relativity=relativity, time_bias=time_bias, transmitter=transmitter, aboard=aboard)
+    if aboard and (troposphere or ionosphere):
+        raise ValueError("between satellites there is no troposphere, and the ionosphere is not modelled: leave them out")
     ray.media(troposphere, ionosphere)
     ray.numbers |= {"range_scale": 0.0, "centre_of_mass": 0.0}
     value = ray.biased(f"(1 + range_scale)*({ray.length} - centre_of_mass)", "range", biases)

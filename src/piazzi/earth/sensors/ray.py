@@ -107,19 +107,24 @@ def ray_of(
     tag: str,
     *,
     steps: bool = False,
-    relativity: bool = False,
+    relativity: bool | str = False,
     time_bias: bool = False,
     transmitter: Station | None = None,
     shift: str = "",
     prefix: str = "",
+    aboard: bool = False,
 ) -> Ray:
     """A signal, with its delay by gravity; `shift` is the text of what is added to times of rows."""
     one_of(path, PATHS, "path")
     one_of(tag, TAGS, "tag")
+    if aboard and (path == "three-way" or tag != "reception"):
+        raise ValueError(
+            f"aboard receives {PATHS[0]} or {PATHS[1]} signals, and times are those of reception: not {path}, {tag}"
+        )
     if (path == "three-way") != (transmitter is not None):
         raise ValueError("a three-way signal has a transmitter, and no other has one: give transmitter=earth.Station(...)")
     moved = " ".join([shift, *(["- time_bias"] if time_bias else [])]).strip()
-    signal = light(path, tag, shift=moved, steps=steps, prefix=prefix, transmitter="transmitter")
+    signal = light(path, tag, shift=moved, steps=steps, prefix=prefix, transmitter="transmitter", aboard=aboard)
     down, up = f" + {prefix}down", f" + {prefix}up"
     after = {"reception": "", "bounce": down, "transmission": down if path == "one-way" else up + down}
     ray = Ray(signal, f"t {moved}".strip() + after[tag], prefix)
@@ -128,7 +133,7 @@ def ray_of(
     if time_bias:
         ray.numbers["time_bias"] = 0.0
     if relativity:
-        found = [shapiro(leg) for leg in signal.legs]
+        found = [shapiro(leg, "earth" if relativity is True else relativity) for leg in signal.legs]
         ray.definitions |= {key: text for _, more in found for key, text in more.items()}
         total = " + ".join(name for name, _ in found)
         ray.delays.append(total if len(found) == 1 else f"({total})/{len(found)}")
