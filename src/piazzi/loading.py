@@ -19,6 +19,9 @@ from piazzi.scenarios.loader import tables_of
 KINDS = (".npz", ".nc", ".csv", ".toml")
 
 
+WORDS = {"chosen": "object", "participants": "participant"}  # of a `Recording`, as options call them
+
+
 def load(
     source: str | os.PathLike[str],
     *,
@@ -27,6 +30,7 @@ def load(
     scale: str | None = None,
     columns: Mapping[str, str] | str | None = None,
     stations: Any = None,
+    participant: Any = (),
     object: str | None = None,  # noqa: A002  # as everywhere
     sigma: str | Sequence[str] = (),
     **conventions: Any,
@@ -46,8 +50,10 @@ def load(
         Of dates in a ``.csv`` that name none; default what the scenario's [recording] says.
     columns : mapping of a name here to a column of the file, or text such as ``"range=RNG[km] week=gps_week sow=gps_tow"``
         For a ``.csv`` with other names; default what the scenario's [recording] says.
-    stations, object, sigma, conventions : files of stations, name, texts such as ``"range.BER=10m"``, ``frame``, ``range``, ...
-        What files of tracking do not say, as `read_tracking` takes it; default what the scenario's [recording] says.
+    stations, participant, object, sigma, conventions
+        Files of stations, orbits of other satellites (``"NAME=FILE"``), name, texts such as ``"range.BER=10m"``, ``frame``,
+        ``range``, ...: what files of tracking do not say, as `read_tracking` takes it; default what the scenario's [recording]
+        says.
 
     Dates become seconds past the problem's epoch.  One without an epoch, whose prior is at the first measurement, gets that of
     the file.
@@ -62,7 +68,7 @@ def load(
     ValueError
         For an unknown scenario or a file with something wrong in it: what, the value, and where.
     """
-    listed = {"sigma": sigma, "stations": () if stations is None else stations}
+    listed = {"sigma": sigma, "stations": () if stations is None else stations, "participants": participant}
     texts = {name: (given,) if isinstance(given, str | os.PathLike) else tuple(given) for name, given in listed.items()}
     frame = conventions.pop("frame", None)
     said = Recording(_mapping(columns), scale, object, frame=frame, answers=conventions, **texts)
@@ -111,7 +117,7 @@ def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, said:
     kind = Path(text).suffix.lower()
     if said != Recording() and kind != ".csv":
         given = next(f.name for f in fields(said) if getattr(said, f.name) != getattr(Recording(), f.name))
-        word = next(iter(said.answers)) if given == "answers" else {"chosen": "object"}.get(given, given)
+        word = next(iter(said.answers)) if given == "answers" else WORDS.get(given, given)
         raise ValueError(f"{text}: --{word} is for files of tracking, with --scenario")
     if scenario is not None and kind != ".csv":
         raise ValueError(f"{text}: only a .csv file is loaded with a scenario; this one holds its own problem")

@@ -115,6 +115,7 @@ SAID = {
     "frame": ("'ITRF'", ["--frame", "ITRF"]),
     "corrections": ("'open'", ["--corrections", "open"]),
     "interval": ("10.0", ["--interval", "10"]),
+    "participant": ("['TWIN=twin.oem', 'igs.sp3']", ["--participant", "TWIN=twin.oem", "--participant", "igs.sp3"]),
     "interval_reference": ("'middle'", ["--interval-reference", "middle"]),
     "range_unit": ("['DSS-25=0.28m']", ["--range-unit", "DSS-25=0.28m"]),
     "repair": ("'exponent'", ["--repair", "exponent"]),

@@ -63,13 +63,15 @@ def recording(function: F) -> F:
         from piazzi.tables.names import parse_columns
 
         answers = told({name.replace("-", "_"): rest.pop(name.replace("-", "_")) for name, *_ in _OPTIONS})
-        words = {name: rest.pop(name) for name in ("chosen", "stations")}
+        words = {name: rest.pop(name) for name in ("chosen", "stations", "participants")}
         words |= {name: answers.pop(name) for name in ("scale", "sigma", "frame") if name in answers}
         columns = parse_columns(answers.pop("columns", ""))
         return function(*args, recording=Recording(columns, answers=answers, **words), **rest)
 
     text = "Stations of tracking: SINEX, TOML, ilrs or mpc; may be repeated."
     command = click.option("--stations", multiple=True, metavar="FILE", help=text)(command)
+    text = "Another satellite that took part, by its orbit: NAME=FILE, or an SP3 file; may be repeated."
+    command = click.option("--participant", "participants", multiple=True, metavar="NAME=FILE", hidden=True, help=text)(command)
     command = click.option("--object", "chosen", metavar="NAME", help="Object to use where tracking has several.")(command)
     for name, metavar, text, several in sorted(_OPTIONS, key=lambda option: option[0] in _SHOWN):
         kind = click.Choice(SCALES, case_sensitive=False) if name == "scale" else None

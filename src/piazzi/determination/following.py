@@ -19,6 +19,7 @@ from piazzi.determination.guesses import Guess
 from piazzi.determination.initial_result import UndeterminedError
 from piazzi.determination.live import Live, Taken
 from piazzi.determination.orbit_forces import Chosen
+from piazzi.determination.partners import partners_of, with_partners
 from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.determination.setup import Setup, posed, setup
@@ -76,7 +77,12 @@ class Following:
         self._given: Setup | None = None
         self._live: Live | None = None
         self._sites = sites_of(self.case.stations)
+        self._partners = partners_of(self.case.participant)
         self._unknowns = asked(self.case.estimate, self.case.consider)
+
+    def _told(self) -> Case:
+        """The case with stations and orbits that were read once."""
+        return replace(self.case, stations=self._sites, participant=self._partners or None)
 
     def _check(self) -> None:
         """Refuse what a run row by row cannot have."""
@@ -130,7 +136,7 @@ class Following:
 
     def _begun(self, rows: Observations, last: bool) -> list[Taken]:
         """An orbit of the first rows, or of the prior; nothing while they do not determine one."""
-        seen, chosen, guess, earlier = read([rows], replace(self.case, stations=self._sites))
+        seen, chosen, guess, earlier = read([rows], self._told())
         count = int(np.isfinite(seen.tracking.values).sum())
         if earlier is None and not last and count < 2 * self._tried:
             self.waiting = f"{count} values do not determine an orbit yet"
@@ -161,14 +167,14 @@ class Following:
         if air is None or said:
             return found
         told = [*listed(self.case.estimate), Estimated("cd", f"~{air.time:.0f}s", air.sigma)]
-        found = read([rows], replace(self.case, stations=self._sites, estimate=told))[1](begin)
+        found = read([rows], replace(self._told(), estimate=told))[1](begin)
         text = f"density of the air departs by {air.sigma:.0%}, correlated over {air.time / 3600.0:.3g} h"
         return replace(found, assumed=(*found.assumed, text))
 
     def _carried(self, rows: Observations) -> list[Taken]:
         """More rows, taken by the estimate in progress."""
         assert self._given is not None and self._live is not None
-        own = of_object(rows, self.case.object)
+        own = of_object(with_partners(rows, self._partners), self.case.object)
         if not (own.measured & own.used).any():
             return []
         seen = self._measured(own)
@@ -187,7 +193,7 @@ class Following:
         seen = measured(
             rows, self._sites, com=case.com, corrections=case.answers.get("corrections"),
             clocks=any(one.what.kind == CLOCK for one in self._unknowns), name=case.object or first.object or None,
-            about=first.about, antenna=case.antenna, epoch=first.epoch,
+            about=first.about, antenna=case.antenna, epoch=first.epoch, partners=self._partners,
         )  # fmt: skip
         return self._live.with_constants(seen) if self._live else seen
 

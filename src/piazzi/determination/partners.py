@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.course import HDF5, JSON, course_of
-from piazzi.determination.sites import ABOARD
+from piazzi.determination.sites import ABOARD, aboard
 from piazzi.earth import Epoch
 from piazzi.earth.constants import SPEED_OF_LIGHT
 from piazzi.formats import Ephemeris, Observations, read_ephemeris
@@ -102,6 +102,8 @@ def partners_of(given: Any) -> dict[str, Partner]:
     """
     if given is None:
         return {}
+    if isinstance(given, Mapping) and all(isinstance(one, Partner) for one in given.values()):
+        return dict(given)
     if isinstance(given, Mapping):
         pairs = [(str(name), orbit) for name, orbit in given.items()]
     else:
@@ -157,7 +159,7 @@ def with_partners(rows: Observations, partners: Mapping[str, Partner]) -> Observ
         rows,
         station=np.where(turned, rows.object, rows.station),
         object=np.where(turned, rows.station, rows.object),
-        extra={**rows.extra, ABOARD: turned | (given[rows.station] & rows.of_kind("pseudorange"))},
+        extra={**rows.extra, ABOARD: aboard(rows) | turned | (given[rows.station] & rows.of_kind("pseudorange"))},
     )
     return replace(rows[~between], left_out=tuple(left_out.items()))
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination.partners import partners_of, with_partners
 from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.earth import Epoch
 from piazzi.estimate.prior import with_prior_at
@@ -52,9 +53,10 @@ def recorded(path: str | os.PathLike[str], scenario: str | os.PathLike[str], sai
     usual = _recording(tables)
     words = {name: getattr(said, name) or getattr(usual, name) for name in ("sigma", "columns", "scale", "frame")}
     answers = {**usual.answers, **said.answers, **{name: word for name, word in words.items() if word}}
-    observations = of_object(read_tracking(path, **answers), said.chosen or usual.chosen)
+    partners = partners_of(said.participants or usual.participants or None)
+    observations = of_object(with_partners(read_tracking(path, **answers), partners), said.chosen or usual.chosen)
     stations = list(said.stations or usual.stations) or None
-    found = measured(observations, stations, corrections=answers.get("corrections"), epoch=_epoch(tables))
+    found = measured(observations, stations, corrections=answers.get("corrections"), epoch=_epoch(tables), partners=partners)
     name = os.path.basename(os.fspath(scenario)).removesuffix(".toml")
     read = None if faults else read_scenario(_with_measurements(tables, found, os.fspath(path)), name, faults)
     if read is None:

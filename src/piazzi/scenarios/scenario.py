@@ -53,6 +53,7 @@ class Recording:
     chosen : the object, in files of tracking of several
     sigma : standard deviations that such files do not say, as ``range.BER=10m``
     stations : files of stations for them
+    participants : other satellites that took part, as ``NAME=FILE`` or files of their orbits
     frame : axes of fixes that do not say theirs
     answers : whatever else such files leave open, by the names that `read_tracking` takes
     """
@@ -63,6 +64,7 @@ class Recording:
     sigma: tuple[str, ...] = ()
     stations: tuple[str, ...] = ()
     frame: str | None = None
+    participants: tuple[str, ...] = ()
     answers: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -95,11 +97,12 @@ def read_recording(table: Table) -> Recording:
     columns = {ours: theirs for ours in inner.data if (theirs := inner.text(ours))}
     scale, chosen, frame = table.text("scale"), table.text("object"), table.text("frame")
     sigma, stations = table.texts("sigma"), table.texts("stations")
+    participants = table.texts("participant")
     answers: dict[str, Any] = {name: table.text(name) for name in ANSWERS}
     answers |= {"interval": table.number("interval", positive=True), "time": table.texts("time")}
     answers["range_unit"] = table.texts("range_unit")
     table.finish()
-    return Recording(columns, scale, chosen, sigma, stations, frame, {k: v for k, v in answers.items() if v})
+    return Recording(columns, scale, chosen, sigma, stations, frame, participants, {k: v for k, v in answers.items() if v})
 
 
 def read_plan(table: Table) -> Plan:
