@@ -7,8 +7,10 @@ import pytest
 
 import piazzi as pz
 from piazzi.determination.figures import drawn, formats_of, width_of
+from piazzi.determination.page.ecliptic import ellipse
 from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.latex import as_latex
+from piazzi.evaluate.quantities import fine, with_sigma
 from piazzi.present.colours import STATIONS
 from tests.determination.fixing import observations, truth
 
@@ -97,3 +99,36 @@ def test_latex_has_every_cell_and_nothing_that_latex_reads(found):
     grid = Grid("a_b", ("", "m^2\n[%]"), (("50% & {x}_$", "-1.5e-07"),))
     body = as_latex([grid]).splitlines()[3:]
     assert body[0] == r" & m$^{2}$ [\%] \\" and body[2] == r"50\% \& \{x\}\_\$ & $-1.5 \times 10^{-7}$ \\"
+
+
+def test_an_orbit_in_space_is_seen_from_three_sides_and_from_aslant(found):
+    figure = dict(drawn(found, 3.5))["orbit"]
+    *sides, space = figure.axes
+    assert [(ax.get_xlabel()[0], ax.get_ylabel()[0]) for ax in sides] == [("x", "y"), ("z", "y"), ("x", "z")]
+    assert {ax.get_xlim() + ax.get_ylim() for ax in sides} == {sides[0].get_xlim() * 2}
+    place, behind = found.estimate.mean[:, :3] / 1e6, []
+    for ax, (i, j) in zip(sides, ((0, 1), (2, 1), (0, 2)), strict=True):
+        pieces = [np.stack(line.get_data(), axis=1) for line in ax.lines]
+        points = np.concatenate([piece[np.isfinite(piece).all(axis=1)] for piece in pieces])
+        nearest = np.linalg.norm(points[None] - place[::8, [i, j]][:, None], axis=2).min(axis=1)
+        assert nearest.max() < 0.3  # of 7, a sixteenth of a revolution at the most
+        hidden = [line for line in ax.lines if line.get_linestyle() == ":"]
+        assert all(np.nanmax(np.hypot(*line.get_data())) < 6.378137 for line in hidden)
+        behind += hidden
+    assert behind
+    assert not space.axison and [text.get_text() for text in space.texts] == ["x", "y", "z"]
+
+
+def test_the_whole_ellipse_is_that_of_the_state():
+    mu, state = 1.32712440018e20, np.array([2.0e11, 2.5e11, -3.0e10, -1.5e4, 1.0e4, 4.0e3])
+    points, h = ellipse(state, mu), np.cross(state[:3], state[3:])
+    assert np.abs(points @ h).max() < 1e-9 * np.linalg.norm(h) * np.linalg.norm(points, axis=1).max()
+    towards = np.cross(state[3:], h) / mu - state[:3] / np.linalg.norm(state[:3])  # the equation of the conic: r + e.r = p
+    np.testing.assert_allclose(np.linalg.norm(points, axis=1) + points @ towards, h @ h / mu, rtol=1e-10)
+    assert ellipse(state * [1, 1, 1, 5, 5, 5], mu).shape == (0, 3)
+
+
+def test_small_angles_are_told_in_seconds_of_arc_and_zero_has_no_sign():
+    assert (fine("rad", 1e-5).unit, fine("rad", 0.1).unit, fine("m", 1e-5).unit) == ("arcsec", "deg", "m")
+    assert 1e-5 * fine("rad", 1e-5).factor == pytest.approx(2.0626480624709636)
+    assert with_sigma(-1e-7, 0.0011) == ("0.0000", "0.0011")

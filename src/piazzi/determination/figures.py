@@ -12,12 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piazzi.determination.page.charts import RTN, passes_of, spans
+from piazzi.determination.page.ecliptic import FARTHEST, TO_ECLIPTIC, ellipse
 from piazzi.determination.page.places import station_rows
 from piazzi.determination.page.sampled import Sampled, sampled
 from piazzi.determination.residuals import table
-from piazzi.evaluate.quantities import display_of
+from piazzi.earth.constants import ASTRONOMICAL_UNIT
+from piazzi.evaluate.quantities import display_of, fine
 from piazzi.io.atomic import atomic_path
 from piazzi.present.colours import MEASURED, PLANET, station_colour
+from piazzi.present.figures.space import UNIT_CIRCLE
 from piazzi.present.figures.style import plain, plain_ticks, time_axis
 from piazzi.present.land import land
 from piazzi.present.report.blocks import Rows
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
 
 FORMATS = ("pdf", "svg", "png", "pgf")
 _RADIUS = 6378137.0
+_BLUE = "#0072B2"
+_ASIDE = (40.0, 25.0)  # azimuth and height from which an orbit is seen aslant
 _LENGTHS = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72.27}
 _RC: Any = {
     "font.size": 8.0, "axes.labelsize": 8.0, "xtick.labelsize": 7.0, "ytick.labelsize": 7.0, "legend.fontsize": 7.0,
@@ -108,7 +113,7 @@ def drawn(found: Any, width: float) -> Iterator[tuple[str, Figure]]:
         return
     if (path.sigmas[path.measured] > 0).any():
         yield "sigma", _one(width, 0.62, partial(sigmas, found=found, path=path))
-    yield "orbit", _three(width, path)
+    yield "orbit", _sides(width, path, found.setup.measured.centre.mu)
     if path.about == "earth":
         yield "ground-track", _one(width, 0.55, partial(ground_track, path=path, rows=rows))
     for one in rows:
@@ -135,8 +140,8 @@ def residuals(ax: Axes, found: Any, kind: str) -> Axes:
     own = (columns["component"] == kind) & np.isfinite(columns["o_minus_c"])
     used, left = own & columns["used"], own & ~columns["used"]
     size = columns["o_minus_c"][used if used.any() else own]
-    show = display_of(str(columns["unit"][own][0]), [float(np.sqrt(np.mean(size**2)))])
-    time = time_axis(ax, found.estimate.times, found.setup.measured.epoch)
+    show = fine(str(columns["unit"][own][0]), float(np.sqrt(np.mean(size**2))))
+    time = time_axis(ax, found.estimate.times, found.setup.measured.epoch, found.scale)
     names = list(dict.fromkeys(columns["station"].tolist()))
     for i, name in enumerate(names):
         here = used & (columns["station"] == name)
@@ -159,7 +164,7 @@ def residuals(ax: Axes, found: Any, kind: str) -> Axes:
 
 def sigmas(ax: Axes, found: Any, path: Sampled) -> Axes:
     """Standard deviations of position along R, T and N against time; grey while a station measures."""
-    time = time_axis(ax, found.estimate.times, found.setup.measured.epoch)
+    time = time_axis(ax, found.estimate.times, found.setup.measured.epoch, found.scale)
     known = path.measured
     show = display_of("m", [float(np.median(path.sigmas[known, :3]))])
     for i, (label, colour) in enumerate(RTN):
@@ -175,31 +180,75 @@ def sigmas(ax: Axes, found: Any, path: Sampled) -> Axes:
     return ax
 
 
-def _three(width: float, path: Sampled) -> Figure:
-    """The orbit from three sides, equal scales."""
+def _sides(width: float, path: Sampled, mu: float) -> Figure:
+    """The orbit from three sides, with equal scales and shared axes, and from aslant."""
     figure = _figure(width, 1.0)
     axes = figure.subplots(2, 2)
-    for ax, (i, j) in zip(axes.ravel(), ((0, 1), (1, 2), (0, 2)), strict=False):
-        view(ax, path, i, j)
-    axes[1, 1].set_axis_off()
+    for ax, (i, j) in zip((axes[0, 0], axes[0, 1], axes[1, 0]), ((0, 1), (2, 1), (0, 2)), strict=True):
+        view(ax, path, mu, i, j)
+    aslant(axes[1, 1], path, mu)
     return figure
 
 
-def view(ax: Axes, path: Sampled, i: int, j: int) -> Axes:
-    """The orbit in the plane of two axes, with the Earth to scale, or the Sun as a point."""
-    from matplotlib.patches import Circle
-
-    show = display_of("m", [float(np.abs(path.mean[:, :3]).max())])
-    factor, unit = (show.factor / 1e3, "1000 km") if path.about == "earth" else (1.0 / 149597870700.0, "AU")
+def _lines(path: Sampled, mu: float) -> tuple[list[tuple[Array, Any]], float, str]:
+    """Lines (P, 3) with their looks, half of what must be seen, and the unit: 1000 km, or AU along the axes of the ecliptic."""
     if path.about == "earth":
-        ax.add_patch(Circle((0, 0), _RADIUS * factor, color=PLANET, lw=0))
-    else:
-        ax.plot(0, 0, "o", ms=3, color="#E69F00")
-    ax.plot(path.mean[:, i] * factor, path.mean[:, j] * factor, color="#0072B2", lw=0.8)
-    ax.set_aspect("equal", adjustable="datalim")
+        place = path.mean[:, :3] / 1e6
+        return [(place, {"color": _BLUE, "lw": 0.8})], 1.08 * max(_RADIUS / 1e6, float(np.abs(place).max())), "1000 km"
+    whole = ellipse(path.mean[len(path.mean) // 2], mu)
+    place, own = (line @ TO_ECLIPTIC.T / ASTRONOMICAL_UNIT for line in (path.mean[:, :3], whole))
+    earth = np.column_stack([UNIT_CIRCLE, np.zeros(len(UNIT_CIRCLE))])
+    lines = [(earth, {"color": MEASURED, "lw": 0.5}), (place, {"color": _BLUE, "lw": 1.4})]
+    if len(own) and np.abs(own).max() < FARTHEST * np.abs(place).max():
+        lines.insert(0, (own, {"color": _BLUE, "lw": 0.5}))
+    return lines, 1.08 * max(float(np.abs(line).max()) for line, _ in lines), "AU"
+
+
+def view(ax: Axes, path: Sampled, mu: float, i: int, j: int) -> Axes:
+    """The orbit in the plane of two axes, with the Earth to scale; about the Sun with its ellipse, and 1 AU for the Earth."""
+    lines, half, unit = _lines(path, mu)
+    axes = np.eye(3)[[i, j]]
+    _seen(ax, path, lines, axes, np.cross(*axes))
+    ax.set_xlim(-half, half)
+    ax.set_ylim(-half, half)
+    ax.set_aspect("equal", adjustable="box")
     ax.set_xlabel(f"{'xyz'[i]} [{unit}]")
     ax.set_ylabel(f"{'xyz'[j]} [{unit}]")
     return ax
+
+
+def aslant(ax: Axes, path: Sampled, mu: float) -> Axes:
+    """The orbit from above and aside, in space, with the directions of the axes."""
+    lines, half, _ = _lines(path, mu)
+    a, e = np.radians(_ASIDE)
+    axes = np.array([[-np.sin(a), np.cos(a), 0.0], [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]])
+    _seen(ax, path, lines, axes, np.cross(*axes))
+    for name, (x, y) in zip("xyz", axes.T * 0.95 * half, strict=True):
+        ax.annotate(
+            name, (0, 0), (float(x), float(y)), ha="center", va="center", fontsize=7,
+            arrowprops={"arrowstyle": "<-", "lw": 0.5, "color": MEASURED}, zorder=1,
+        )  # fmt: skip
+    ax.set_xlim(-1.15 * half, 1.15 * half)
+    ax.set_ylim(-1.15 * half, 1.15 * half)
+    ax.set_aspect("equal", adjustable="box")
+    ax.set_axis_off()
+    return ax
+
+
+def _seen(ax: Axes, path: Sampled, lines: Sequence[tuple[Array, Any]], axes: Array, towards: Array) -> None:
+    """Lines seen along a direction, dotted where they are behind the Earth."""
+    from matplotlib.patches import Circle
+
+    radius = _RADIUS / 1e6 if path.about == "earth" else 0.0
+    if radius:
+        ax.add_patch(Circle((0, 0), radius, color=PLANET, lw=0, zorder=0.5))
+    else:
+        ax.plot(0, 0, "o", ms=3, color="#E69F00")
+    for line, look in lines:
+        flat, behind = line @ axes.T, (np.linalg.norm(line @ axes.T, axis=1) < radius) & (line @ towards < 0.0)
+        for hidden, dash in ((False, "-"), (True, ":")):
+            if (behind == hidden).any():
+                ax.plot(*np.where((behind == hidden)[:, None], flat, np.nan).T, dash, **look)
 
 
 def ground_track(ax: Axes, path: Sampled, rows: Sequence[Rows]) -> Axes:

@@ -34,8 +34,8 @@ def plot(found: Any, ax: Axes | None, what: str, which: str | None) -> Axes:
     if what == "sigma":
         return figures.sigmas(ax, found, path)
     if what == "orbit":
-        plane = _one_of(which, ["xy", "yz", "xz"], "plane")
-        return figures.view(ax, path, *("xyz".index(axis) for axis in plane))
+        plane, mu = _one_of(which, ["xy", "yz", "xz", "space"], "plane"), found.setup.measured.centre.mu
+        return figures.aslant(ax, path, mu) if plane == "space" else figures.view(ax, path, mu, *map("xyz".index, plane))
     rows = station_rows(found, path)
     if what == "ground-track":
         return figures.ground_track(ax, path, rows)

@@ -66,6 +66,7 @@ def tab(found: Any) -> Tab:
         time.show,
         switch=len(keys) > 1,
         epoch=found.setup.measured.epoch,
+        scale=found.scale,
     )
 
 

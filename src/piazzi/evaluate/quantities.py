@@ -89,7 +89,7 @@ def with_sigma(value: float, sigma: float) -> tuple[str, str]:
     if abs(value) >= 1e12 or sigma >= 1e9:
         digits = decimals + 1 + floor(log10(abs(value))) if value else 2
         return number(value, min(max(digits, 2), 16)), number(sigma, 2)
-    return f"{value:.{max(decimals, 0)}f}", f"{sigma:.{max(decimals, 0)}f}"
+    return f"{value:z.{max(decimals, 0)}f}", f"{sigma:.{max(decimals, 0)}f}"
 
 
 def duration(seconds: float | None) -> str:

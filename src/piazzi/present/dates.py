@@ -37,14 +37,14 @@ class Tick:
 
 @dataclass(frozen=True)
 class Calendar:
-    """A clock beside times in seconds past an epoch: in UTC where there is UTC, before 1960 in TT."""
+    """A clock of a time scale beside times in seconds past an epoch: by default UTC where there is UTC, before 1960 TT."""
 
     epoch: Epoch
+    scale: str = ""
 
-    @property
-    def scale(self) -> str:
-        """What the clock shows."""
-        return str(self.epoch).rpartition(" ")[2]
+    def __post_init__(self) -> None:
+        if not self.scale:
+            object.__setattr__(self, "scale", str(self.epoch).rpartition(" ")[2])
 
     @property
     def label(self) -> str:

@@ -12,7 +12,7 @@ from piazzi.determination.page.sampled import Sampled
 from piazzi.determination.residuals import table
 from piazzi.determination.setup import scale_of
 from piazzi.evaluate.information import factor
-from piazzi.evaluate.quantities import Display, display_of, number
+from piazzi.evaluate.quantities import Display, display_of, fine, number
 from piazzi.present.colours import station_colour
 from piazzi.present.report.blocks import Axis, Chart, Line, Section
 from piazzi.problem.checks import Array
@@ -48,7 +48,7 @@ def _kind(columns: dict[str, Array], kind: str, unit: str, stations: dict[str, i
     largest = float(np.abs(size).max()) if size.size else 1.0
     rms = float(np.sqrt(np.mean(size**2))) if size.size else 1.0
     half = 1.1 * max(min(largest, 20.0 * rms), min(WIDEST * rms, _largest(columns, left))) or 1.0
-    show = display_of(unit, [rms])
+    show = fine(unit, rms)
     lines = [
         Line(*_values(columns, here), name, kind="points", colour=station_colour(index), notes=_notes(columns, here))
         for name, index in stations.items()

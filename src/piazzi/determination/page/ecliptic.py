@@ -14,6 +14,10 @@ from piazzi.present.report.blocks import Orbit, Section, Track
 from piazzi.problem.checks import Array
 
 OBLIQUITY = np.radians(84381.406 / 3600.0)  # of the ecliptic of J2000 to the axes, IAU 2006
+TO_ECLIPTIC = np.array(
+    [[1.0, 0.0, 0.0], [0.0, np.cos(OBLIQUITY), np.sin(OBLIQUITY)], [0.0, -np.sin(OBLIQUITY), np.cos(OBLIQUITY)]]
+)
+FARTHEST, NEAREST = 6.0, 0.18  # of ellipses that are drawn: over the size of what was seen; of the picture, for a name
 PLANETS = ("mercury", "venus", "earth", "mars", "jupiter", "saturn")
 _AU = Display("AU", 1.0 / ASTRONOMICAL_UNIT)
 _WORDS = (
@@ -30,20 +34,40 @@ def ecliptic(found: Any, path: Sampled) -> Section:
 
 
 def _plane(found: Any, path: Sampled, epochs: Any) -> Orbit:
-    c, s = np.cos(OBLIQUITY), np.sin(OBLIQUITY)
-    R = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
-    place = path.mean[:, :3] @ R.T
+    R = TO_ECLIPTIC
+    place, own = path.mean[:, :3] @ R.T, ellipse(path.mean[len(path.mean) // 2], found.setup.measured.centre.mu) @ R.T
     tracks = [
         Track(place[:, 0], place[:, 1], found.object or "object", 0, *_ellipse(R[:2] @ path.covariance[:, :3, :3] @ R[:2].T))
     ]
-    reach = 1.1 * float(np.abs(place[:, :2]).max())
+    long = not len(own) or np.abs(own).max() > FARTHEST * np.abs(place).max()  # as that of a comet
+    whole = place if long else own
+    reach, rings = 1.1 * float(np.abs(whole[:, :2]).max()), [whole]
     for name in PLANETS:
-        there = body(name, epochs, center="sun")[0] @ R.T
-        if name == "earth" or np.abs(there[:, :2]).max() < reach:
+        there, speed = (v @ R.T for v in body(name, epochs, center="sun"))
+        round_ = ellipse(np.concatenate([there[0], speed[0]]), found.setup.measured.centre.mu)
+        if name == "earth" or NEAREST * reach < np.abs(round_).max() < reach:
             tracks.append(Track(there[:, 0], there[:, 1], name))
-            reach = max(reach, 1.1 * float(np.abs(there[:, :2]).max()))
+            rings.append(round_)
+            reach = max(reach, 1.1 * float(np.abs(round_[:, :2]).max()))
     sun = np.zeros(len(path.times))
-    return Orbit("Plane of the ecliptic", [*tracks, Track(sun, sun, "sun")], ("x", "y"), _AU, (-reach, reach, -reach, reach))
+    tracks.append(Track(sun, sun, "sun"))
+    limits, lines = (-reach, reach, -reach, reach), [(line[:, 0], line[:, 1]) for line in rings]
+    return Orbit("Plane of the ecliptic", tracks, ("x", "y"), _AU, limits, rings=lines)
+
+
+def ellipse(state: Array, mu: float) -> Array:
+    """The ellipse (181, 3) on which a state is; nothing, (0, 3), where it is on none."""
+    r, v = state[:3], state[3:6]
+    h = np.cross(r, v)
+    towards = np.cross(v, h) / mu - r / np.linalg.norm(r)
+    e, energy = float(np.linalg.norm(towards)), 0.5 * float(v @ v) - mu / float(np.linalg.norm(r))
+    if energy >= 0.0 or not np.linalg.norm(h) > 0.0:
+        return np.empty((0, 3))
+    P = towards / e if e > 1e-12 else r / np.linalg.norm(r)
+    Q = np.cross(h, P) / np.linalg.norm(h)
+    a, E = -0.5 * mu / energy, np.linspace(0.0, 2.0 * np.pi, 181)[:, None]
+    out: Array = a * (np.cos(E) - e) * P + a * np.sqrt(1.0 - e * e) * np.sin(E) * Q
+    return out
 
 
 def _sky(found: Any, path: Sampled, earth: Array) -> list[Orbit]:

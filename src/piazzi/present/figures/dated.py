@@ -31,9 +31,9 @@ class _Round(Locator):
         return [mark.t * self._factor for mark in marks]
 
 
-def date_axis(ax: Axes, epoch: Epoch, factor: float) -> None:
+def date_axis(ax: Axes, epoch: Epoch, factor: float, scale: str = "") -> None:
     """Dates on the axis of time, where x is `factor` times seconds past the epoch."""
-    calendar, words = Calendar(epoch), FixedFormatter([])
+    calendar, words = Calendar(epoch, scale), FixedFormatter([])
     ax.xaxis.set_major_locator(_Round(calendar, factor, words))
     ax.xaxis.set_major_formatter(words)
     ax.set_xlabel(calendar.label)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from piazzi.evaluate.observable import Observability
+from piazzi.present.colours import DASHES
 from piazzi.present.figures.style import MEASURED, STATIONS, plain, plain_ticks, time_axis
 from piazzi.problem import epoch_of
 from piazzi.problem.checks import Array
@@ -32,11 +33,17 @@ def bound_sigmas(ax: Axes, found: Observability) -> Axes:
     return ax
 
 
+def _dash(i: int) -> Any:
+    """Of the i-th line, where the colours begin anew."""
+    dash = DASHES[i // len(STATIONS) % len(DASHES)]
+    return (0, dash) if dash else "-"
+
+
 def _growing(ax: Axes, found: Observability, values: Array, labels: Sequence[str]) -> None:
     time = time_axis(ax, found.growth_times, epoch_of(found.problem, found.tracking))
     shown = np.where(np.isfinite(values) & (values > 0), values, np.nan)
     for i, label in enumerate(labels):
-        ax.plot(found.growth_times * time.factor, shown[:, i], color=STATIONS[i % len(STATIONS)], label=label)
+        ax.plot(found.growth_times * time.factor, shown[:, i], color=STATIONS[i % len(STATIONS)], ls=_dash(i), label=label)
     ax.axhline(1, color=MEASURED, lw=0.9, ls=(0, (5, 3)), label="prior")
     if not np.isnan(shown).all():
         ax.set_yscale("log")

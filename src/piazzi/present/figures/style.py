@@ -63,14 +63,14 @@ def drawn(count: int) -> slice:
     return slice(None, None, max(1, -(-count // MOST_POINTS)))
 
 
-def time_axis(ax: Axes, times: Array, epoch: Epoch | None = None) -> Display:
-    """Label and limit the axis of time, which has dates where there is an instant to count from; returns its unit."""
+def time_axis(ax: Axes, times: Array, epoch: Epoch | None = None, scale: str = "") -> Display:
+    """Label and limit the axis of time, with dates where there is an epoch to count from (see `Calendar`); returns its unit."""
     show = time_display(times)
     ax.set_xlabel(show.label("time"))
     if epoch is not None:
         from piazzi.present.figures.dated import date_axis
 
-        date_axis(ax, epoch, show.factor)
+        date_axis(ax, epoch, show.factor, scale)
     if len(times) > 1:
         margin = 0.01 * (times[-1] - times[0])
         ax.set_xlim((times[0] - margin) * show.factor, (times[-1] + margin) * show.factor)

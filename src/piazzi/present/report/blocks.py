@@ -116,7 +116,8 @@ class Track:
 class Orbit:
     """An animated path about a planet; with `close` errors about the origin, scaled anew at every epoch.
 
-    `sites` are stations: name, colour, and where they stand, or stood when they measured.  Where it is `mirrored`, x grows
+    `sites` are stations: name, colour, and where they stand, or stood when they measured; `rings` are lines that do not move,
+    as whole ellipses are.  Where it is `mirrored`, x grows
     to the left, as right ascension does on a sky.
     """
 
@@ -129,6 +130,7 @@ class Orbit:
     close: bool = False
     note: str = ""
     sites: Sequence[tuple[str, str, Array, Array]] = ()
+    rings: Sequence[tuple[Array, Array]] = ()
     mirrored: bool = False
 
 
@@ -265,7 +267,7 @@ class Section:
 class Tab:
     """One problem, or one study: a summary first, then sections.  With `times` (K,) it has a cursor and can be played.
 
-    Charts over time have dates where times are past an `epoch`.
+    Charts over time have dates where times are past an `epoch`, of a time `scale` (see `present.dates.Calendar`).
 
     Where it is not to `switch`, its keys are not offered to be switched.  Tabs with values of what was varied, `at`,
     are picked by them, beside those without.
@@ -281,3 +283,4 @@ class Tab:
     switch: bool = True
     at: Sequence[tuple[str, str]] = ()
     epoch: Epoch | None = None
+    scale: str = ""

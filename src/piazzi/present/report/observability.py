@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from piazzi.evaluate.observable import Observability
 from piazzi.evaluate.quantities import Display
-from piazzi.present.colours import STATIONS
+from piazzi.present.colours import DASHES, STATIONS
 from piazzi.present.figures.style import time_display
 from piazzi.present.report.blocks import Axis, Chart, Line, Point, Section, Tab, Text, Tone
 from piazzi.present.report.windows import table_of
@@ -66,7 +68,7 @@ def _singular_values(found: Observability) -> Chart:
         label = "best seen" if i == 0 else "worst seen" if i == n - 1 else f"direction {i + 1}"
         values = found.growth_values[:, i]
         values = np.where(values > 0, values, np.nan)
-        lines.append(Line(found.growth_times, values, label, colour=STATIONS[i % len(STATIONS)]))
+        lines.append(Line(found.growth_times, values, label, **_look(i)))
     y = Axis("singular value [1/prior sigma]", Display(""), "log", *_limits(lines, 1.0))
     x = _time(found)
     return Chart("Information about the first state", x, y, lines, levels=[(1.0, "as much as the prior")])
@@ -77,10 +79,15 @@ def _sigmas(found: Observability) -> Chart:
     for i, state in enumerate(found.problem.model.names):
         sigma = found.growth_sigma[:, i] / found.scale[i]
         sigma = np.where(np.isfinite(sigma) & (sigma > 0), sigma, np.nan)
-        lines.append(Line(found.growth_times, sigma, state, colour=STATIONS[i % len(STATIONS)]))
+        lines.append(Line(found.growth_times, sigma, state, **_look(i)))
     y = Axis("Cramer-Rao sigma [prior sigma]", Display(""), "log", *_limits(lines, 1.0))
     x = _time(found)
     return Chart("How well each state can be known", x, y, lines, levels=[(1.0, "as well as the prior")])
+
+
+def _look(i: int) -> dict[str, Any]:
+    """Of the i-th line: dashed where the colours begin anew."""
+    return {"colour": STATIONS[i % len(STATIONS)], "dash": DASHES[i // len(STATIONS) % len(DASHES)]}
 
 
 def _time(found: Observability) -> Axis:

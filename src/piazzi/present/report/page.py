@@ -242,6 +242,7 @@ class _Builder:
             "limits": list(orbit.limits),
             "planet": orbit.planet_radius,
             "mirrored": orbit.mirrored,
+            "rings": [[self.pool.add(x), self.pool.add(y)] for x, y in orbit.rings],
             "tracks": [self._track(track) for track in orbit.tracks],
             "sites": [
                 {"label": printable(label), "colour": colour, "x": self.pool.add(x), "y": self.pool.add(y)}

@@ -6,7 +6,7 @@ import numpy as np
 
 from piazzi.evaluate.quantities import display_of, unit_of
 from piazzi.present.colours import station_colour
-from piazzi.present.figures.space import position_columns
+from piazzi.present.figures.space import planes, position_columns
 from piazzi.present.report.blocks import Orbit, Track
 from piazzi.present.report.panels import sigmas_of
 from piazzi.present.report.views import Views
@@ -15,11 +15,11 @@ from piazzi.problem.checks import Array
 
 
 def orbits(views: Views, planet_radius: float | None) -> list[Orbit]:
-    """Paths in the plane of the first two components of position, in space of the first and third too, and close-ups."""
+    """Paths in the plane of two components of position, in space in all three, and close-ups."""
     if position_columns(views.comparison.problem) is None:
         return []
-    i, *others = views.comparison.problem.model.group_indices["position"]
-    return [orbit for j in others[:2] for orbit in _plane(views, (i, j), planet_radius, named=len(others) > 1)]
+    found = planes(views.comparison.problem)
+    return [orbit for plane in found for orbit in _plane(views, plane, planet_radius, named=len(found) > 1)]
 
 
 def _plane(views: Views, columns: tuple[int, int], planet_radius: float | None, *, named: bool) -> list[Orbit]:

@@ -82,7 +82,7 @@ def calendar_data(tab: Tab) -> dict[str, Any] | None:
         return None
     from piazzi.present.dates import Calendar
 
-    return Calendar(tab.epoch).to_dict(np.zeros(1) if tab.times is None else tab.times)
+    return Calendar(tab.epoch, tab.scale).to_dict(np.zeros(1) if tab.times is None else tab.times)
 
 
 def axis_data(axis: Axis) -> Mapping[str, Any]:

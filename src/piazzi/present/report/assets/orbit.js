@@ -83,6 +83,11 @@ class Orbit {
       const wide = this.spec.planet * f * this.unit > 44;
       if (wide) this.still.append(element("text", { x: this.px(0), y: this.py(0) + 4, "text-anchor": "middle", class: "on-planet" }, "central body"));
     }
+    for (const ring of this.spec.rings) {
+      const [xs, ys] = ring.map(array);
+      const points = Array.from(xs, (x, i) => `${this.px(x * f).toFixed(1)} ${this.py(ys[i] * f).toFixed(1)}`);
+      this.still.append(element("path", { d: `M${points.join("L")}`, class: "ring" }));
+    }
     for (const track of this.tracks) {
       track.points = Array.from(track.x, (x, i) => {
         const far = (v) => Math.min(Math.max(v, -2000), 4000).toFixed(1);
