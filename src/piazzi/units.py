@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from piazzi.text import nearest
+from piazzi.text import nearest, one_line
 
 DIMENSIONS = ("length", "angle", "time", "mass")
 SI = ("m", "rad", "s", "kg")
@@ -37,6 +37,17 @@ TABLE: Mapping[str, tuple[float, tuple[int, int, int, int]]] = {
     "Pa": (1.0, (-1, 0, -2, 1)),
 }  # fmt: skip
 
+# Lengths of time as options and keys have them, such as 30s, 10min, 6h, 1d, "1 day"; a year is Julian.
+_TIMES: Mapping[str, float] = {
+    name: value
+    for value, names in (
+        (1.0, "s sec second seconds"), (60.0, "min minute minutes"), (3600.0, "h hr hour hours"), (86400.0, "d day days"),
+        (604800.0, "week weeks"), (31557600.0, "yr year years"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"),
+    )
+    for name in names.split()
+}  # fmt: skip
+_DURATION = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z]*)", re.ASCII)
+
 _FACTOR = re.compile(r"\s*(?:1|([A-Za-z]+)\s*(?:\^\s*([+-]?\d{1,2}(?:\.\d{1,3})?))?)\s*")
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z].*)", re.ASCII)
 
@@ -51,6 +62,29 @@ def size_of(text: str) -> float:
     match = _QUANTITY.fullmatch(text)
     assert match is not None
     return float(match[1])
+
+
+def duration(text: str, what: str, *, plain: bool = True) -> float:
+    """A length of time in seconds, as 30s, 10min, 6h, 1d or "1 day"; a number alone is of seconds where that is `plain`.
+
+    Raises
+    ------
+    ValueError
+        With `what` and the text, where it is none.
+    """
+    match = _DURATION.fullmatch(str(text)[:100].strip())
+    factor = None if match is None else _TIMES.get(match[2] or ("s" if plain else ""))
+    if match is None or factor is None or not math.isfinite(value := float(match[1]) * factor):
+        raise ValueError(f"{what} is {one_line(str(text), 60)!r}; write a length of time such as 60s, 10min, 6h or 3d")
+    return value
+
+
+def positive_duration(text: str, what: str, *, plain: bool = True) -> float:
+    """A `duration` above zero."""
+    value = duration(text, what, plain=plain)
+    if value <= 0:
+        raise ValueError(f"{what} is {one_line(str(text), 60)!r}; it must be a positive length of time")
+    return value
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def test_sources_and_seeds(call, place, command, arguments, words):
         (["study", B612, "--report", "file"], "file: no folder can be made there: a file is in the way"),
         (["compare", B612, "--report", "file"], "file: no folder can be made there: a file is in the way"),
         (["demo", "-o", "file"], "file/satellite-bearing: no folder can be made there: a file is in the way"),
-        (["compare", B612, "--with", "window:"], "nothing follows the colon; write window:LAG[s][xITERATIONS][:LOSS[=K]]"),
+        (["compare", B612, "--with", "window:"], "nothing follows the colon; write window:LAG[xITERATIONS][:LOSS[=K]]"),
         (["estimate", B612, "--with", "ekf:"], "nothing follows the colon; write ekf"),
         (["estimate", B612, "--follow", "noise.csv"], "noise.csv: line 1: it is not UTF-8 text: byte 0xff"),
         (["estimate", B612, "--follow", "header.csv"], "header.csv: unknown column 'rang'"),

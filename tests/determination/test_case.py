@@ -45,10 +45,10 @@ def test_help_shows_eight():
         ({"with_": "grpah"}, "with: .*did you mean 'graph'"),
         ({"epoch": "2016-02-13T16:00:00"}, "epoch: .*no time scale"),
         ({"span": "first"}, "two ends"),
-        ({"step": "60"}, "length of time such as 60s"),
+        ({"step": "60x"}, "length of time such as 60s, 10min"),
         ({"covariance": "scald"}, "covariance is 'scald'; did you mean 'scaled'"),
         ({"strict": "yes"}, "true or false"),
-        ({"interval": "long"}, "interval is 'long', which is no number"),
+        ({"interval": "long"}, "interval is 'long'; write a length of time"),
     ],
 )
 def test_what_cannot_be_is_refused(words, says):

@@ -30,7 +30,7 @@ def test_a_list_of_unknowns_is_read_word_by_word():
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("cd/12", "cd/12 is '12'; write a length of time such as 60s, 6h or 3d"),
+        ("cd/12", "cd/12 is '12'; write a length of time such as 60s, 10min, 6h or 3d"),
         ("cd//12h", "'cd//12h' cannot be read: write such as cd/12h cr"),
         ("5 cd", "'5' cannot be read"),
         ("bias.range=", "'bias.range=' cannot be read"),

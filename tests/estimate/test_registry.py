@@ -72,7 +72,7 @@ def test_names_mean_estimators(text, estimator):
         ("window:x3", "write window:LAG or window:LAGxITERATIONS"),
         ("window:-5", "write window:LAG"),
         ("window:1.5", "write window:LAG"),
-        ("window:60m", "or window:60s for seconds"),
+        ("window:60m", "write a length of time such as"),
         ("window:1e3s", "write window:LAG"),
         ("window:60sx0", "iterations is 0"),
         ("window:9999999999999", "write window:LAG"),

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import click
 
-from piazzi.cli.options import F, number
+from piazzi.cli.options import F, duration
 
 _OPTIONS: tuple[tuple[str, str, str, bool], ...] = (
     ("range", "WAY", "What ranges are: one-way, two-way (half of the way there and back), round-trip or three-way.", False),
@@ -16,7 +16,7 @@ _OPTIONS: tuple[tuple[str, str, str, bool], ...] = (
     ("tag", "EVENT", "What times are of: transmit, bounce or receive.", False),
     ("frame", "AXES", "Axes of measurements whose file names none, as ITRF; of the answer where every file does.", False),
     ("corrections", "STATE", "Whether corrections of the file are applied or open.", False),
-    ("interval", "SECONDS", "Over which range rates are averaged.", False),
+    ("interval", "TIME", "Over which range rates are averaged.", False),
     ("interval-reference", "PART", "Of that interval, what times are of: start, middle or end.", False),
     ("repair", "WHAT", "Mend what contradicts its neighbours: exponent, of ranges of space surveillance.", False),
     ("debias", "FILE", "Take biases of star catalogues off asteroid astrometry: bias.dat of Eggl et al. 2020.", False),
@@ -37,10 +37,10 @@ def conventions(function: F) -> F:
 
 
 def told(options: dict[str, Any]) -> dict[str, Any]:
-    """The words that were given, by the names that `read_tracking` takes; raises click.BadParameter for no number."""
+    """The words that were given, by the names that `read_tracking` takes; raises click.BadParameter for no length of time."""
     found = {name: value for name, value in options.items() if value not in (None, ())}
     if "interval" in found:
-        found["interval"] = number(found["interval"])
+        found["interval"] = duration(found["interval"])
     return found
 
 

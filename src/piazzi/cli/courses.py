@@ -11,6 +11,7 @@ import numpy as np
 
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
+from piazzi.units import duration, positive_duration
 
 STATES = ("x", "y", "z", "vx", "vy", "vz")
 STEP, SPAN = 60.0, 86400.0
@@ -118,9 +119,7 @@ def span_of(course: Course, begin: str | None, end: str | None, step: str | None
     usual = SPAN if given is None else float(given[-1] - given[0])
     last = first + usual if end is None else _time(problem, end, "--to", first)
     first, last = min(first, last), max(first, last)
-    every = STEP if step is None else _duration(step, "--step")
-    if every <= 0:
-        raise ValueError(f"--step is {every:g} s; it must be positive")
+    every = STEP if step is None else positive_duration(step, "--step")
     count = int(np.floor((last - first) / every * (1 + 1e-12))) + 1
     if count > MOST:
         raise ValueError(f"--to and --step make {count:g} states; at most {MOST:g} are allowed")
@@ -132,26 +131,10 @@ def _time(problem: Problem, text: str, what: str, since: float) -> float:
     """Seconds past the epoch of a date, or of a time after `since`."""
     plain = text.strip().removeprefix("+")
     try:
-        return since + _duration(plain, what)
+        return since + duration(plain, what)
     except ValueError:
         if problem.epoch is None:
             raise
     from piazzi.determination.words import date
 
     return float(date(text, what) - problem.epoch)
-
-
-def _duration(text: str, what: str) -> float:
-    """Seconds, plain or with a unit."""
-    from piazzi.earth.station_files import quantity
-
-    try:
-        seconds = float(text)
-    except ValueError:
-        try:
-            seconds = quantity(text, "s", what)
-        except ValueError:
-            seconds = np.nan
-    if not np.isfinite(seconds):
-        raise ValueError(f"{what} is {text[:60]!r}; it must be a time such as 600, '10 min', '36 h' or '3 day'")
-    return seconds

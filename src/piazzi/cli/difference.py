@@ -21,7 +21,7 @@ TRUTHS = (".toml", ".npz", ".nc")
     "--axes", metavar="AXES", default="RTN", show_default=True, help="RTN or TNW of A, or a frame such as GCRF or ITRF."
 )
 @click.option("--span", metavar="'FIRST .. LAST'", help="Dates with their scale; either may be left out.")
-@click.option("--step", metavar="SECONDS", type=float, help="Time step.  [default: the rows of A]")
+@click.option("--step", metavar="TIME", type=options.duration, help="Time step.  [default: the rows of A]")
 @click.option("--object", "chosen", metavar="NAME", help="Object in files of several, by name or identifier.")
 @click.option("--degree", metavar="N", type=options.WholeNumber(1), help="Of the polynomial between rows.  [default: chosen]")
 @options.seed

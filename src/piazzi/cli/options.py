@@ -38,6 +38,16 @@ def number(text: str) -> float:
         raise click.BadParameter(f"{text!r} is not a valid number.") from None
 
 
+def duration(text: str) -> float:
+    """A positive length of time in seconds, with or without a unit."""
+    from piazzi.units import positive_duration
+
+    try:
+        return positive_duration(text, "it")
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
+
+
 seed = click.option("--seed", type=WholeNumber(0), metavar="N", default=0, show_default=True, help="Seed of simulation.")
 
 

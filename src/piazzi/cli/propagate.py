@@ -19,8 +19,8 @@ ENDINGS = (".oem", ".nc", ".csv")
 @click.argument("orbit", metavar="ORBIT")
 @click.option("--forces", metavar="FORCES", help="default, none, a .toml with [earth], or NAME=VALUE ...  [default: by height]")
 @click.option("--from", "begin", metavar="DATE", help="Where to begin.  [default: the orbit's own date]")
-@click.option("--to", "end", metavar="DATE", help="Date with its scale, or a time such as '3 day'.  [default: 1 day]")
-@click.option("--step", metavar="TIME", help="Between states: seconds, or such as '10 min'.  [default: 60 s]")
+@click.option("--to", "end", metavar="DATE", help="Date with its scale, or a time such as 3d.  [default: 1 day]")
+@click.option("--step", metavar="TIME", help="Between states: seconds, or such as 10min.  [default: 60 s]")
 @click.option("--frame", metavar="FRAME", default="GCRF", show_default=True, help="Frame of the output.")
 @click.option("--object", "chosen", metavar="NAME", help="Object in files of several, by name or identifier.")
 @options.output("Write states and covariances as .oem, .nc or .csv.")
@@ -44,7 +44,7 @@ def command(
     A scenario has forces, process noise and a prior of its own.
 
     Examples:
-      piazzi propagate old.oem --to "3 day" -o new.oem
+      piazzi propagate old.oem --to 3d -o new.oem
       piazzi propagate iss.tle --to "2026-11-05 UTC" --frame ITRF -o iss.csv
       piazzi propagate state.opm --forces "degree=40 tides=none" --json
     """

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.words import date, seconds
+from piazzi.determination.words import date
 from piazzi.earth import Epoch
 from piazzi.earth.rotation import frame_named
 from piazzi.formats import Arc, Ephemeris
+from piazzi.units import positive_duration
 
 STEP, DAILY = 60.0, 86400.0  # s, of an orbit about the Earth and about the Sun
 MOST_STATES = 200_000
@@ -50,7 +51,7 @@ def end_of(text: Any, first: Epoch, last: Epoch, default: Epoch) -> Epoch:
             if not rest:
                 return base
             if rest[0] in "+-":
-                length = seconds(rest[1:].strip(), f"--span: {word}")
+                length = positive_duration(rest[1:], f"--span: {word}")
                 return base + (length if rest[0] == "+" else -length)
     return date(plain, "--span")
 

@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.words import date, pairs, quantity, seconds
+from piazzi.determination.words import date, pairs, quantity
 from piazzi.earth import Epoch
 from piazzi.earth.rotation import TURNING, frame_named
 from piazzi.opening import opened
 from piazzi.text import nearest, one_line
+from piazzi.units import positive_duration
 
 ORBIT = {"RTN": "RTN", "RSW": "RTN", "RIC": "RTN", "QSW": "RTN", "TNW": "TNW"}
 KEYS = ("dv", "axes", "sigma", "for", "engine")
@@ -94,7 +95,7 @@ def _burn(epoch: Epoch, said: Mapping[str, str]) -> Burn:
     if "dv" not in said:
         raise ValueError(f"it has no dv: write such as {EXAMPLE}")
     dv = _three(said["dv"], "m/s", "dv")
-    duration = seconds(said["for"], "for") if "for" in said else 0.0
+    duration = positive_duration(said["for"], "for", plain=False) if "for" in said else 0.0
     return _judged(epoch, dv, axes_named(said.get("axes", "RTN")), duration, said.get("sigma"), said.get("engine", ""))
 
 

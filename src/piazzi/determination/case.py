@@ -188,7 +188,7 @@ class Case:
             if value is None or (isinstance(value, tuple | list) and not value):
                 continue
             if name in ANSWERS:
-                answers[name] = read.measure("s")(value, where.format(_key(word))) if name == "interval" else value
+                answers[name] = read.duration(value, where.format(_key(word))) if name == "interval" else value
             else:
                 found[name] = _read(OPTIONS[name], value, where.format(_key(word)))
         return replace(self, answers=answers, **found)

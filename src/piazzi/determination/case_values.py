@@ -9,6 +9,7 @@ from math import isfinite
 from typing import Any
 
 from piazzi.text import one_line
+from piazzi.units import positive_duration
 
 _PLAIN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -71,9 +72,7 @@ def measure(unit: str, least: float | None = None) -> Callable[[Any, str], float
 
 def duration(value: Any, where: str) -> float:
     """A length of time, as text with a unit, or a number of seconds."""
-    from piazzi.determination.words import seconds
-
-    return seconds(value, where) if isinstance(value, str) else positive(value, where)
+    return positive_duration(value, where) if isinstance(value, str) else positive(value, where)
 
 
 def instant(value: Any, where: str) -> Any:

@@ -11,7 +11,6 @@ import numpy as np
 from piazzi.determination.course import Course, course_of
 from piazzi.determination.looking import LIT, LONGEST, SAMPLES, Observer, observer, seen, where
 from piazzi.determination.passing import Instant, Passage, passages, span_of
-from piazzi.determination.words import seconds
 from piazzi.earth import Epoch, Station
 from piazzi.earth.constants import ASTRONOMICAL_UNIT
 from piazzi.earth.stepping import longest_step
@@ -19,6 +18,7 @@ from piazzi.evaluate.grids import Grid, as_html, as_rich
 from piazzi.evaluate.quantities import finite, number
 from piazzi.problem.checks import Array
 from piazzi.text import brief, printable
+from piazzi.units import positive_duration
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -218,7 +218,7 @@ def ephemeris(
     """
     place = where(station, stations)
     first, last = span_of(when, place, now=now)
-    width = seconds(step, "--step") if isinstance(step, str) else float(step)
+    width = positive_duration(step, "--step") if isinstance(step, str) else float(step)
     if not width > 0.0:
         raise ValueError(f"step is {width:g} s; it must be positive")
     if frequency is not None and not 0.0 < frequency < np.inf:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -10,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.setup import Setup
-from piazzi.determination.words import seconds
 from piazzi.estimate.batch import BatchLeastSquares
 from piazzi.estimate.estimator import Estimate, Estimator
 from piazzi.estimate.factor_graph import FactorGraph
@@ -20,11 +18,10 @@ from piazzi.problem.checks import Array
 
 DEFAULT = ("graph",)
 TOLERANCE = 1e-4  # sigma, to which batch least squares is taken: below, rounding over days of orbits moves it
-_WINDOW = re.compile(r"window:(\d+(?:\.\d+)?)(min|h|d)(x\d+)?(:.*)?", re.ASCII)
 
 
 def estimators(given: Any) -> dict[str, Estimator]:
-    """Estimators by the text that asked for them; a window's length may be in min, h or d.
+    """Estimators by the text that asked for them.
 
     Raises
     ------
@@ -36,14 +33,7 @@ def estimators(given: Any) -> dict[str, Estimator]:
     if isinstance(given, Mapping):
         return dict(given)
     names: Iterable[Any] = [given] if isinstance(given, str) else given
-    return {str(name).strip(): parse(_in_seconds(str(name).strip())) for name in names}
-
-
-def _in_seconds(text: str) -> str:
-    match = _WINDOW.fullmatch(text)
-    if match is None:
-        return text
-    return f"window:{seconds(match[1] + match[2], 'window'):.12g}s{match[3] or ''}{match[4] or ''}"
+    return {str(name).strip(): parse(str(name).strip()) for name in names}
 
 
 def estimate(given: Setup, estimator: Estimator, keep: Array) -> Estimate:

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.looking import elevation_of
-from piazzi.determination.words import date, seconds
+from piazzi.determination.words import date
 from piazzi.earth import Epoch, Station
 from piazzi.problem.checks import Array
+from piazzi.units import positive_duration
 
 DUSK = np.radians(-6.0)  # of the Sun's elevation: the end of civil twilight, when satellites are seen
 MINUTE, DAY = 60.0, 86400.0
@@ -59,7 +60,7 @@ def span_of(when: Any, station: Station, *, now: Epoch | None = None) -> tuple[E
         begin = date(first, "--when")
         if not dots:
             return begin, begin
-        end = begin + seconds(last[1:].strip(), "--when") if last.startswith("+") else date(last, "--when")
+        end = begin + positive_duration(last[1:], "--when") if last.startswith("+") else date(last, "--when")
     if end < begin:
         raise ValueError(f"--when {when!r}: it ends before it begins")
     return begin, end

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any, NamedTuple
 
-from piazzi.determination.words import date, quantity, seconds
+from piazzi.determination.words import date, quantity
 from piazzi.earth import Epoch
 from piazzi.text import nearest, one_line
+from piazzi.units import positive_duration
 
 PASS = "pass"
 BIAS, SCALE, CLOCK, DV = "bias", "scale", "clock", "dv"
@@ -46,7 +47,7 @@ class Estimated:
         if isinstance(self.sigma, str) and re.match(r"\s*(-|\+?0*\.?0*([a-zA-Z%]|$))", self.sigma):
             raise ValueError(f"{self}: a sigma is positive, not {self.sigma}")
         if self.per is not None and self.per != PASS:
-            seconds(self.per.removeprefix("~"), self.label)
+            self.period  # noqa: B018
         if self.kind == DV:
             self.epoch  # noqa: B018
             if self.per is not None:
@@ -74,7 +75,7 @@ class Estimated:
     @property
     def period(self) -> float:
         """Seconds of a value, or of the process."""
-        return seconds(str(self.per).removeprefix("~"), self.label)
+        return positive_duration(str(self.per).removeprefix("~"), self.label, plain=False)
 
     @property
     def epoch(self) -> Epoch:

@@ -7,9 +7,8 @@ from math import isfinite
 
 from piazzi.earth import Epoch
 from piazzi.text import nearest, one_line
-from piazzi.units import TABLE, Units
+from piazzi.units import Units
 
-DAY = {"d": 86400.0, "yr": 31557600.0}  # lengths of time that `units` does not know
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re.ASCII | re.DOTALL)
 
 
@@ -49,19 +48,6 @@ def quantity(text: str, unit: str, what: str) -> float:
             f"{what} is {one_line(text, 60)!r}; it must be {f'in a unit such as {unit}' if unit else 'a plain number'}"
         )
     return value * found.factor
-
-
-def seconds(text: str, what: str) -> float:
-    """A length of time such as 60s, 6h or 3d, in seconds; raises ValueError unless it is positive."""
-    match = _NUMBER.fullmatch(text.strip())
-    unit = match[2].strip() if match else ""
-    known = {name: factor for name, (factor, powers) in TABLE.items() if powers == (0, 0, 1, 0)} | DAY
-    if match is None or unit not in known:
-        raise ValueError(f"{what} is {one_line(text, 60)!r}; write a length of time such as 60s, 6h or 3d")
-    value = float(match[1]) * known[unit]
-    if not (isfinite(value) and value > 0):
-        raise ValueError(f"{what} is {one_line(text, 60)!r}; it must be a positive length of time")
-    return value
 
 
 def date(text: str, what: str) -> Epoch:

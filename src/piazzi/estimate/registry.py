@@ -10,6 +10,7 @@ from typing import Any, cast
 
 from piazzi.estimate.estimator import Estimator
 from piazzi.text import nearest
+from piazzi.units import duration
 
 GATE, ITERATIONS = 0.999, 5  # where the text gives no number
 
@@ -108,16 +109,16 @@ def _window(option: str) -> Mapping[str, Any]:
 
 
 def _size(option: str) -> Mapping[str, Any]:
-    """States or seconds, then how often: ``100``, ``100x3``, ``60s``, ``60sx3``."""
-    found = re.fullmatch(r"(?:(\d{1,9})|(\d{1,9}(?:\.\d{1,9})?)s)(?:x(\d{1,9}))?", option, re.ASCII)
+    """States or a length of time, then how often: ``100``, ``100x3``, ``60s``, ``6h``, ``60sx3``."""
+    found = re.fullmatch(r"(?:(\d{1,9})|(\d{1,9}(?:\.\d{1,9})? ?[A-Za-wyz]+))(?:x(\d{1,9}))?", option, re.ASCII)
     if not option:
         return {}
     if not found:
         raise ValueError(
-            "write window:LAG or window:LAGxITERATIONS, such as window:100, window:100x3, or window:60s for seconds"
+            "write window:LAG or window:LAGxITERATIONS, such as window:100, window:100x3, or a length of time as in window:60s"
         )
-    states, seconds, iterations = found.groups()
-    lag = {"lag_seconds": float(seconds)} if seconds else {"lag": int(states)}
+    states, length, iterations = found.groups()
+    lag = {"lag_seconds": duration(length, "its length")} if length else {"lag": int(states)}
     return lag | ({"iterations": int(iterations)} if iterations else {})
 
 
@@ -165,8 +166,8 @@ ESTIMATORS: Mapping[str, Entry] = {
         _graph,
     ),
     "window": Entry(
-        "window:LAG[s][xITERATIONS][:LOSS[=K]]",
-        "factor graph over the newest LAG states, or LAG seconds",
+        "window:LAG[xITERATIONS][:LOSS[=K]]",
+        "factor graph over the newest LAG states, or of a length of time as 60s, 6h",
         "piazzi.estimate.sliding_window:SlidingWindow",
         _window,
     ),
