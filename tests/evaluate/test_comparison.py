@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi.cli.compare import rows as comparison_rows
 from piazzi.estimate import Estimate
 from piazzi.evaluate import Comparison, compare, evaluate, posterior_bounds
 from piazzi.evaluate.comparison_table import columns, sentences
@@ -25,9 +26,9 @@ ROW = {
     "nees_ideal", "nees_ideal_last_half",
     "position_crlb", "velocity_crlb", "position_crlb_last_half", "velocity_crlb_last_half", "convergence_time",
     "nees_low", "nees_high", "nees_last_half_low", "nees_last_half_high", "nees_effective_epochs",
-    "nis_low", "nis_high", "whiteness", "whiteness_high", "bias", "bias_high",
+    "nis_low", "nis_high", "whiteness", "whiteness_high", "bias", "bias_high", "residual_rms", "apart",
 }  # fmt: skip
-ERRORS = {k for k in ROW if any(word in k for word in ("rmse", "nees", "crlb", "convergence"))}  # not known without truth
+ERRORS = {k for k in ROW if any(word in k for word in ("rmse", "nees", "crlb", "convergence"))} | {"apart"}  # not known without truth
 pytestmark = pytest.mark.usefixtures("uncompiled")
 POSITION = {"position": ["a", "b"]}
 
@@ -305,6 +306,21 @@ def test_html_escapes_what_users_wrote(good):
     assert "<script>" not in page
     assert "&lt;script&gt;" in page
     assert page.count("<tr>") == 2
+
+
+def test_without_truth_residuals_and_the_first_estimator_judge(good):
+    """Whoever ends elsewhere is named with how far; one that failed is no measure."""
+    bare = replace(good, tracking=replace(good.tracking, truth=None), view="delayed")
+    lost = replace(bare, mean=bare.mean + np.array([4.0, 0.0]))
+    comparison = compared(failed=replace(bare, failure="no"), batch=bare, near=replace(bare, mean=bare.mean + 0.5), lost=lost)
+    assert [row["apart"] for row in comparison.to_dict()["rows"][1:]] == [None, pytest.approx(0.5), pytest.approx(4.0)]
+    text = str(comparison)
+    assert "The last states of lost are 4 sigma from those of batch" in text
+    assert {"last state from batch", "residual RMS"} <= {c.name for c in columns(*parts(comparison))}
+    assert "residual RMS" not in {c.name for c in columns(*parts(compared(good=good)))}  # errors are known
+    rows = comparison_rows(comparison)
+    assert rows[3]["residual_rms"] == comparison.rows[3].residual_rms[""]
+    assert comparison.to_dataset()["residual_rms"].values.tolist() == [row.residual_rms[""] for row in comparison.rows]
 
 
 def test_what_a_gate_rejected_is_told(good):

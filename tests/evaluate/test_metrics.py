@@ -1,5 +1,7 @@
 """Errors and consistency against definitions written out epoch by epoch."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import piazzi as pz
-from piazzi.evaluate import errors, has_diverged, nees, nis, rmse
-from piazzi.evaluate.metrics import residual_rms, squared_in_sigmas
+from piazzi.evaluate import errors, evaluate, has_diverged, nees, nis, rmse
+from piazzi.evaluate.metrics import apart, residual_rms, squared_in_sigmas
 from tests.evaluate.conftest import made
 from tests.laws.problems import b612
 
@@ -193,3 +195,30 @@ def test_residuals_are_what_the_states_leave_of_the_measurements():
     assert_allclose(estimate.details["residuals"][:, 0], left, rtol=0, atol=1e-9)
     assert residual_rms(estimate) == {"range": pytest.approx(np.sqrt(np.nanmean(left**2)))}
     assert residual_rms(pz.ExtendedKalmanFilter().estimate(problem, tracking)) == {}
+
+
+def test_residuals_by_unit_are_of_the_states_of_the_estimate():
+    """Of an estimator that keeps none, too; of components of one unit together; of the rows that it used."""
+    sensor = pz.Sensor("both", {"a": "x", "b": "x + 2*y", "turn": "y"}, units={"a": "m", "b": "m", "turn": "rad"})
+    model = pz.Model(["x", "y"], ["0", "0"], [sensor])
+    problem = pz.Problem(model, pz.Gaussian([0.0, 0.0], np.eye(2)), stations=[pz.Station("s", "both", [1.0, 1.0, 0.01])])
+    values = np.random.default_rng(3).standard_normal((30, 3)) * [1.0, 1.0, 0.1]
+    values[4, 1] = np.nan
+    values[7] = 50.0
+    tracking = pz.Tracking(np.arange(30.0), values)
+    for estimator in (pz.ExtendedKalmanFilter(), pz.FactorGraph(), pz.ExtendedKalmanFilter(gate=0.999)):
+        estimate = estimator.estimate(problem, tracking)
+        left = values - estimate.mean @ np.array([[1.0, 0.0], [1.0, 2.0], [0.0, 1.0]]).T
+        if "rejected" in estimate.details:
+            assert estimate.details["rejected"].tolist() == [k == 7 for k in range(30)]
+            left[7] = np.nan
+        expected = {"m": np.sqrt(np.nanmean(left[:, :2] ** 2)), "rad": np.sqrt(np.nanmean(left[:, 2] ** 2))}
+        assert evaluate("any", estimate).residual_rms == pytest.approx(expected, rel=1e-12)
+
+
+def test_how_far_another_ends_is_told_in_its_sigma():
+    answer = made(np.zeros((5, 2)), np.diag([1.0, 4.0]))
+    other = made(np.array([[9.0, 0.0]] * 4 + [[0.5, 3.0]]), np.diag([0.01, 9.0]))
+    assert apart(replace(answer, view="delayed"), replace(other, view="delayed")) == pytest.approx(1.5)  # of the answer
+    assert apart(answer, other) == pytest.approx(5.0)  # in real time one's own
+    assert apart(answer, answer) == 0.0

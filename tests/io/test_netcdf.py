@@ -14,7 +14,7 @@ from numpy.testing import assert_array_equal
 import piazzi as pz
 from piazzi.estimate import Estimate
 from piazzi.io import load_estimate, save, save_estimate
-from piazzi.io.netcdf import read_estimate, read_netcdf, write_estimate, write_netcdf
+from piazzi.io.netcdf import read_estimate, read_netcdf, write_dataset, write_estimate, write_netcdf
 from tests.references.drawn import TEXT, problems, same_bits, same_problem, same_tracking, trackings
 
 QUIET = settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
@@ -276,3 +276,11 @@ def test_nothing_is_left_where_writing_fails(tmp_path):
     with pytest.raises(OSError, match="there is no folder"):
         save(tmp_path / "none" / "a.nc", problem, tracking)
     assert os.listdir(tmp_path) == []
+
+
+def test_what_a_determination_found_is_no_recording(tmp_path):
+    """It has residuals and no problem: the line says what to name instead."""
+    path = tmp_path / "found.nc"
+    write_dataset(path, xarray.Dataset({"o_minus_c": (("measurement",), np.zeros(3))}))
+    with pytest.raises(ValueError, match=r"found\.nc: it is what a determination found.*--scenario.*--with"):
+        pz.load(path)

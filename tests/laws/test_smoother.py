@@ -38,6 +38,16 @@ class TestLinear:
         assert_graph_is(estimate, dense.smooth(*case.chain), 1e-7)
         assert_same_estimate(estimate, pz.FactorGraph().estimate(case.problem, case.tracking), 1e-7)
 
+    @given(st.integers(1, 5), SENSORS, SEEDS)
+    @settings(max_examples=10)
+    def test_further_passes_change_nothing(self, n, widths, seed):
+        case = LinearCase(n, widths, seed)
+        once = SMOOTHER.estimate(case.problem, case.tracking)
+        again = pz.Smoother(iterations=3, cross_covariances=True).estimate(case.problem, case.tracking)
+        assert_same_estimate(again, once, 1e-7)
+        assert_allclose(again.details["cross_covariances"], once.details["cross_covariances"], rtol=0, atol=1e-7)
+        assert_allclose(again.innovations, once.innovations, rtol=0, atol=1e-7)
+
     @given(st.integers(1, 5), SENSORS, st.integers(0, 2), SEEDS)
     @settings(max_examples=15)
     def test_a_state_known_at_the_start(self, n, widths, rank, seed):
@@ -201,3 +211,20 @@ def test_a_rough_measurement_counts_beside_precise_later_ones(estimator, ratio, 
         expected = float((b.T * information**-1 * b)[0])
     first = (estimate.delayed or estimate).covariance[0]
     assert_allclose(np.array([0.6, 0.8]) @ first @ [0.6, 0.8], expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("gap", [8.0, 40.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_passes_mend_what_the_filter_lost_over_a_gap(gap, seed):
+    """Where a belief is long when the second pass begins, one linearisation over the gap is sigmas off; passes converge."""
+    prior, radar = pz.Gaussian([11.5, 0.0, 0.0, 9.7], 0.25 * np.eye(4)), pz.Station("radar", "range", 1e-4, {"mx": 10.0, "my": 0.0})
+    problem = b612(Q=[0.0] * 4, prior=prior, stations=[radar])
+    first = np.arange(0.0, 4.0, 0.1)
+    tracking = pz.simulate(problem, np.concatenate([first, gap + first]), np.random.default_rng(seed))
+    graph = pz.FactorGraph().estimate(problem, tracking)
+    sigma = np.sqrt(np.diagonal(graph.covariance, axis1=1, axis2=2))
+    off = [np.abs((pz.Smoother(iterations=i).estimate(problem, tracking).mean - graph.mean) / sigma).max() for i in (1, 3, 5)]
+    assert graph.success
+    assert off[0] > 0.5
+    assert off[1] < 0.02
+    assert off[2] < 1e-5

@@ -67,4 +67,10 @@ def command(
 
 def rows(comparison: Comparison) -> list[dict[str, Any]]:
     """The rows of a comparison, their single values."""
-    return [{k: v for k, v in row.items() if not isinstance(v, list)} for row in comparison.to_dict()["rows"]]
+    from piazzi.evaluate.rows import residual_name
+
+    found = []
+    for row in comparison.to_dict()["rows"]:
+        left = {residual_name(unit): value for unit, value in row.pop("residual_rms").items()}
+        found.append({k: v for k, v in row.items() if not isinstance(v, list)} | left)
+    return found

@@ -17,6 +17,8 @@ from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.information import singular
+from piazzi.evaluate.judgement import APART, NEAR
+from piazzi.evaluate.metrics import apart
 from piazzi.evaluate.quantities import finite, number
 from piazzi.orbit import state_axes
 from piazzi.problem.checks import Array
@@ -24,7 +26,6 @@ from piazzi.problem.checks import Array
 KEYS = ("seen", "alone", "converged", "honest", "agreed", "complete")
 DECISIVE = KEYS[:3]
 SURE = 0.999  # of the two-sided test of residuals
-NEAR, APART = 1.0, 3.0  # sigma, by which estimators of all measurements, and those of real time, may differ
 TOLD = 3  # forces that are left out, the largest
 UNLIKELY = 0.01  # of another orbit that fits
 STILL = 1e-2  # sigma of a last step
@@ -259,15 +260,8 @@ def agreed(given: Setup, name: str, estimates: Mapping[str, Estimate]) -> Senten
 
 
 def apart_by(answer: Estimate, other: Estimate, k: int) -> float:
-    """The largest difference of a state at an epoch, in sigma of the answer; of one in real time at the end, in its own.
-
-    What an estimator in real time says before that is made of other measurements.
-    """
-    k = k if other.view == "delayed" else len(other.times) - 1
-    covariance = (answer if other.view == "delayed" else other).covariance[k]
-    with np.errstate(all="ignore"):
-        sigma = np.sqrt(np.maximum(np.diag(covariance)[:6], 0.0))
-        return float(np.max(np.abs(other.mean[k, :6] - answer.mean[k, :6]) / sigma))
+    """The largest difference of a state of the orbit at an epoch, in sigma; see `apart`."""
+    return apart(answer, other, k, 6)
 
 
 def _count(many: int, what: str) -> str:

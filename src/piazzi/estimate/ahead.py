@@ -36,7 +36,9 @@ def specs_of(estimator: Any, problem: Problem) -> list[KernelSpec]:
         case SquareRootKalmanFilter():
             return [linear_root(estimator.gate).spec(problem)]
         case Smoother():
-            return [smoother_spec(problem)]
+            model = problem.model
+            again = [chain_spec(problem), solve_spec(model.n, model.width, problem.noise_varies)]
+            return [smoother_spec(problem), *(again if estimator.iterations > 1 else [])]
         case SlidingWindow():
             return [window_spec(problem, estimator.loss)]
         case FactorGraph():

@@ -97,6 +97,13 @@ def _plain(option: str) -> Mapping[str, Any]:
     return {}
 
 
+def _passes(option: str) -> Mapping[str, Any]:
+    """How often: ``smoother:3``."""
+    if option and not re.fullmatch(r"\d{1,9}", option, re.ASCII):
+        raise ValueError("its only option is a number of passes, such as smoother:3")
+    return {"iterations": int(option)} if option else {}
+
+
 def _window(option: str) -> Mapping[str, Any]:
     """A lag with iterations, and a loss: ``window:100x3:huber``."""
     size, _, word = option.partition(":")
@@ -148,10 +155,10 @@ ESTIMATORS: Mapping[str, Entry] = {
         _gated,
     ),
     "smoother": Entry(
-        "smoother",
-        "fixed-interval smoother: the extended Kalman filter forward, and once back",
+        "smoother[:PASSES]",
+        "fixed-interval smoother: the extended Kalman filter forward, and once back; further passes along what it found",
         "piazzi.estimate.smoother:Smoother",
-        _plain,
+        _passes,
     ),
     "batch": Entry(
         "batch",

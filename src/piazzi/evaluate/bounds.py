@@ -144,6 +144,14 @@ def linearized_rows(problem: Problem, tracking: Tracking, states: Array) -> tupl
     return chain.nu, chain.H
 
 
+def residuals_at(problem: Problem, tracking: Tracking, states: Array) -> Array:
+    """Measurements minus what states (K, n) say they should be, (J, m), NaN where missing."""
+    chain = Chain(problem, prepare(problem, tracking))
+    chain.x[:] = states
+    with np.errstate(all="ignore"):
+        return chain.residuals()
+
+
 def _scaled(problem: Problem, scale: Array) -> Array:
     return np.asarray(scale[1:, None, None] * problem.process_noise.covariance)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from piazzi.evaluate.bounds import Bounds, posterior_bounds
 from piazzi.evaluate.comparison_table import grid, html, render
 from piazzi.evaluate.consistency_tests import LONGEST
 from piazzi.evaluate.grids import as_text
+from piazzi.evaluate.metrics import apart
 from piazzi.evaluate.rows import Row, evaluate, numbers
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.epochs import dated
@@ -158,7 +159,17 @@ def compare(
         else:
             estimates[name] = estimate
         rows += found
-    return Comparison(problem, tracking, tuple(rows), estimates, source)
+    return Comparison(problem, tracking, _beside_first(rows, estimates), estimates, source)
+
+
+def _beside_first(rows: Sequence[Row], estimates: Mapping[str, Estimate]) -> tuple[Row, ...]:
+    """The rows with how far their last states are from those of the first estimator that succeeded."""
+    first = next((e for e in estimates.values() if e.success), None)
+    if first is None:
+        return tuple(rows)
+    views = {(name, e.view): e for name, own in estimates.items() for e in (own, own.delayed) if e is not None}
+    others = {key: apart(first, e) for key, e in views.items() if e is not first}
+    return tuple(replace(row, apart=others.get((row.estimator, row.view))) for row in rows)
 
 
 def bounds_of(problem: Problem, tracking: Tracking) -> Bounds | None:

@@ -8,8 +8,17 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from piazzi.evaluate.grids import Grid, fits, rich_table
-from piazzi.evaluate.judgement import claims, errors_known, expected_nis, failing, fails_at_first_only, not_diverged, tested
-from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ideal, number, unit_of
+from piazzi.evaluate.judgement import (
+    claims,
+    errors_known,
+    expected_nis,
+    failing,
+    fails_at_first_only,
+    far_apart,
+    not_diverged,
+    tested,
+)
+from piazzi.evaluate.quantities import NOTHING, Display, display_of, duration, ends, ideal, number, unit_of
 from piazzi.model import Model
 from piazzi.text import printable
 
@@ -21,6 +30,7 @@ if TYPE_CHECKING:
 
 _VIEW = {"realtime": "real time", "delayed": "delayed"}
 TESTS, PASSED, BOUND = "tests failed", "none", "bound"
+LINEARISED_ONCE = "a filter and one pass of a smoother linearise each step once, graph, window:2 and smoother:3 anew"
 _TEXT_COLUMNS = 2  # name and view, before the numbers
 
 
@@ -57,6 +67,8 @@ def columns(model: Model, rows: Sequence[Row], values: Array) -> list[Column]:
             found.append(Column(f"{printable(group)} RMSE", part, printable(show.unit), tuple(shown)))
         bounds = (number(_times(r.crlb_last_half.get(group), show.factor)) for r in rows)
         found.append(Column(f"{printable(group)} {BOUND}", "last half", printable(show.unit), tuple(bounds)))
+    if not errors_known(rows):
+        found += _without_truth(rows)
     whole, half = (ideal(r.nees_ideal for r in rows), ideal(r.nees_ideal_last_half for r in rows))
     found += [
         Column("mean NEES", "whole run", whole, tuple(number(r.mean_nees, 3) for r in rows)),
@@ -68,6 +80,19 @@ def columns(model: Model, rows: Sequence[Row], values: Array) -> list[Column]:
         Column("", "", "", tuple(_remark(r) for r in rows)),
     ]
     return [c for i, c in enumerate(found) if i < _TEXT_COLUMNS or any(v not in ("", NOTHING) for v in c.texts)]
+
+
+def _without_truth(rows: Sequence[Row]) -> list[Column]:
+    """What stands where errors would: residuals by unit, and how far the last states are from those of the first estimator."""
+    found = []
+    for unit in dict.fromkeys(unit for r in rows for unit in r.residual_rms):
+        values = [r.residual_rms.get(unit) for r in rows]
+        show = display_of(unit, values)
+        shown = tuple(number(_times(v, show.factor)) for v in values)
+        found.append(Column("residual RMS", "", printable(show.unit), shown))
+    first = next((r.estimator for r in rows if r.success and r.apart is None), "")
+    apart = tuple(number(r.apart, 2) for r in rows)
+    return [*found, Column(f"last state from {printable(first)}", "", "sigma", apart)]
 
 
 def grid(model: Model, rows: Sequence[Row], values: Array) -> Grid:
@@ -164,6 +189,7 @@ def sentences(model: Model, rows: Sequence[Row], values: Array) -> list[str]:
         out += _best(model, rows, judged)
     elif judged:
         out.append("There is no truth to compare with, so errors are unknown.")
+        out += _apart(rows)
     what, basis = ("Errors", "NEES of this one run") if known else ("Innovations", "NIS")
     for claim in claims(rows, values):
         names = _list([_named(r, judged) for r in claim.rows])
@@ -204,6 +230,17 @@ def _modes(rows: Sequence[Row]) -> list[str]:
             more = f" and {len(row.modes) - 4} more" if len(row.modes) > 4 else ""
             out.append(f"{row.estimator} found {len(row.modes)} solutions, with probabilities {_list(shares)}{more}.")
     return out
+
+
+def _apart(rows: Sequence[Row]) -> list[str]:
+    """Who ends elsewhere than the first estimator, and what linearises better."""
+    far = far_apart(rows)
+    if not far:
+        return []
+    off = f"{' to '.join(f'{v:g}' for v in ends(r.apart for r in far))} sigma"
+    first = next(r.estimator for r in rows if r.success and r.apart is None)
+    who = _list([_named(r, rows) for r in far])
+    return [f"The last states of {who} are {off} from those of {first}: {LINEARISED_ONCE}."]
 
 
 def _best(model: Model, rows: Sequence[Row], judged: Sequence[Row]) -> list[str]:

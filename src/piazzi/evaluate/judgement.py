@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 CLEARLY = 1.5  # times as large: one run without a test cannot tell a smaller factor
 SAME_ERROR = 1.01  # errors nearer than this are called the same
+NEAR, APART = 1.0, 3.0  # sigma, by which estimators of all measurements, and those of real time, may differ
 SLOW_CONVERGENCE = 5.0  # times the error of the last half that the whole run's must be to be called slow to settle
 OPTIMISTIC, CONSISTENT, PESSIMISTIC = 1, 0, -1
 
@@ -104,6 +105,13 @@ def expected_nis(values: Array) -> float | None:
     """Mean number of components per row of measurements: what a mean NIS should be near."""
     present = (~np.isnan(values)).sum(axis=1)
     return float(present[present > 0].mean()) if present.any() else None
+
+
+def far_apart(rows: Sequence[Row]) -> list[Row]:
+    """Rows whose last states are further from those of the first estimator than either may be."""
+    first = next((r.view for r in rows if r.success and r.apart is None), "")
+    limits = [NEAR if row.view == first == "delayed" else APART for row in rows]
+    return [r for r, limit in zip(rows, limits, strict=True) if r.success and r.apart is not None and not r.apart <= limit]
 
 
 def tested(row: Row) -> bool:

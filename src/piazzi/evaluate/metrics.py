@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate
+from piazzi.model import Sensor
 from piazzi.problem.checks import Array
 
 _CHUNK = 1 << 14  # epochs at a time: the work space stays in the processor's cache
@@ -250,20 +251,40 @@ def _not_decreasing(error: Array, columns: Sequence[Sequence[int]], from_first: 
     return bool(found) and all(found)
 
 
+def apart(answer: Estimate, other: Estimate, k: int = -1, states: int | None = None) -> float:
+    """The largest difference of the first so many states at an epoch, in sigma of the answer.
+
+    What an estimator in real time says before the end is made of other measurements: it is compared there, in its own sigma.
+    """
+    k, sure = (k, answer) if other.view == "delayed" else (-1, other)
+    with np.errstate(all="ignore"):
+        sigma = np.sqrt(np.maximum(np.diag(sure.covariance[k])[:states], 0.0))
+        off = np.abs(other.mean[k, :states] - answer.mean[k, :states])
+        return float(np.max(np.where(off == 0.0, 0.0, off / sigma)))
+
+
 def residual_rms(estimate: Estimate) -> dict[str, float]:
     """Root mean square of measurement minus estimate of every component, by name; empty where the estimator kept none.
 
     Components of the same name, at several stations, are taken together.
     """
     residuals = estimate.details.get("residuals")
-    if residuals is None:
-        return {}
+    return {} if residuals is None else _rms_by(estimate, residuals, lambda sensor, component: component)
+
+
+def residual_rms_by_unit(estimate: Estimate, residuals: Array) -> dict[str, float]:
+    """Root mean square of residuals (J, m) over all components of a unit, such as "m" and "rad": of the rows that were used."""
+    used_only = np.where(used(estimate), residuals, np.nan)
+    return _rms_by(estimate, used_only, lambda sensor, component: dict(sensor.units)[component])
+
+
+def _rms_by(estimate: Estimate, residuals: Array, key: Callable[[Sensor, str], str]) -> dict[str, float]:
     problem = estimate.problem
     station = estimate.tracking.stations_of(problem)
     found: dict[str, list[Array]] = {}
     for s, place in enumerate(problem.stations):
-        rows = residuals[station == s]
-        for i, component in enumerate(problem.model.sensor(place.sensor).components):
-            found.setdefault(component, []).append(rows[:, i][~np.isnan(rows[:, i])])
+        rows, sensor = residuals[station == s], problem.model.sensor(place.sensor)
+        for i, component in enumerate(sensor.components):
+            found.setdefault(key(sensor, component), []).append(rows[:, i][~np.isnan(rows[:, i])])
     together = {name: np.concatenate(values) for name, values in found.items()}
     return {name: float(np.sqrt((v**2).mean())) for name, v in together.items() if v.size}

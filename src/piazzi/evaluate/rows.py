@@ -9,10 +9,20 @@ from typing import Any
 import numpy as np
 
 from piazzi.estimate.estimator import Estimate
-from piazzi.evaluate.bounds import Bounds
+from piazzi.evaluate.bounds import Bounds, residuals_at
 from piazzi.evaluate.consistency import Check
-from piazzi.evaluate.consistency_tests import ConsistencyTests, check_consistency
-from piazzi.evaluate.metrics import convergence_time, diverged, groups, known_truth, nis, outliers, rmse, squared_in_sigmas
+from piazzi.evaluate.consistency_tests import LONGEST, ConsistencyTests, check_consistency
+from piazzi.evaluate.metrics import (
+    convergence_time,
+    diverged,
+    groups,
+    known_truth,
+    nis,
+    outliers,
+    residual_rms_by_unit,
+    rmse,
+    squared_in_sigmas,
+)
 from piazzi.evaluate.quantities import finite, unit_of
 from piazzi.model import Model
 from piazzi.problem.checks import Array
@@ -38,6 +48,10 @@ class Row:
     rejected : rows of measurements that a gate left out; None, and no part of the dictionary, where there is no gate
     outliers : rows to which a loss gave hardly any weight; likewise
     modes : the solutions that a bank of starts found, with "probability", "cost" and first "state"; likewise
+    residual_rms : what the states of the estimate leave of the measurements used, RMS by unit, such as "m" and "rad": where an
+        estimate is of real time, after each measurement was taken in
+    apart : largest difference of the last states from those of the comparison's first estimator, in its sigma, or in real time
+        in one's own; None for that one itself
     """
 
     estimator: str
@@ -61,6 +75,8 @@ class Row:
     modes: Sequence[Mapping[str, Any]] | None = None
     nees_ideal: float | None = None
     nees_ideal_last_half: float | None = None
+    residual_rms: Mapping[str, float] = field(default_factory=dict)
+    apart: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The row in the contract's names, numbers that are not finite as None."""
@@ -71,6 +87,8 @@ class Row:
         out |= {f"{g}_rmse_last_half": finite(self.rmse_last_half.get(g)) for g in names}
         squares = ("mean_nees", "mean_nees_last_half", "nees_ideal", "nees_ideal_last_half", "mean_nis")
         out |= {k: finite(getattr(self, k)) for k in squares}
+        out["residual_rms"] = {unit: finite(value) for unit, value in self.residual_rms.items()}
+        out["apart"] = finite(self.apart)
         out["diverged"] = self.diverged
         out |= {f"{g}_crlb": finite(self.crlb.get(g)) for g in names}
         out |= {f"{g}_crlb_last_half": finite(self.crlb_last_half.get(g)) for g in names}
@@ -138,7 +156,18 @@ def evaluate(name: str, estimate: Estimate, bounds: Bounds | None = None, *, tho
         modes=estimate.details.get("modes"),
         nees_ideal=consistency.ideal() if consistency else None,
         nees_ideal_last_half=consistency.ideal(last) if consistency else None,
+        residual_rms=_left_over(estimate) if thorough else {},
     )
+
+
+def _left_over(estimate: Estimate) -> Mapping[str, float]:
+    """Residuals by unit, of the estimator's own or at its states; nothing for runs too long, or states that are not finite."""
+    residuals = estimate.details.get("residuals")
+    if residuals is None:
+        if len(estimate.mean) > LONGEST or not np.isfinite(estimate.mean).all():
+            return {}
+        residuals = residuals_at(estimate.problem, estimate.tracking, estimate.mean)
+    return residual_rms_by_unit(estimate, residuals)
 
 
 def _spread(variances: np.ndarray[Any, Any]) -> float:
@@ -157,7 +186,15 @@ def numbers(model: Model, rows: Sequence[Row]) -> list[tuple[str, Array, dict[st
                 out.append((key, np.array(values, dtype=bool), {}))
             else:
                 out.append((key, np.array([np.nan if v is None else v for v in values], dtype=float), _unit(model, key)))
+    for unit in dict.fromkeys(unit for row in rows for unit in row.residual_rms):
+        left = np.array([row.residual_rms.get(unit, np.nan) for row in rows])
+        out.append((residual_name(unit), left, {"units": unit}))
     return out
+
+
+def residual_name(unit: str) -> str:
+    """Name of a column of residuals in this unit."""
+    return f"residual_rms_{unit}".rstrip("_").replace("/", "_per_").replace("^", "")
 
 
 def _unit(model: Model, key: str) -> dict[str, str]:

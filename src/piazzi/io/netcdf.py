@@ -115,6 +115,11 @@ def _write(path: str | os.PathLike[str], groups: Mapping[str, xarray.Dataset]) -
 
 def _content(root: Any) -> tuple[Problem, Tracking]:
     faults = Faults()
+    if "about" not in root and "o_minus_c" in root:
+        raise ValueError(
+            "it is what a determination found, without its problem: name the tracking itself, with --scenario, or give the "
+            "estimators to determine, each by --with"
+        )
     about = Table(hdf5.document(root, "about"), "about", faults)
     if about.text("format") != FORMAT:
         kind = "format" if about.raw("format") is not None else "schema"  # a study has one, and no measurements

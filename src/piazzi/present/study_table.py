@@ -73,7 +73,7 @@ def columns(summary: Summary) -> list[Column]:
         Column("mean NEES", ideal_nees(lines), tuple(number(line.mean_nees_last_half, 3) for line in lines)),
         Column("median NEES", "last half", tuple(number(line.median_nees_last_half, 3) for line in lines), False),
         Column("NEES in 99 % bounds", "of epochs", inside, False),
-        Column("mean NIS", "", tuple(number(line.mean_nis, 3) for line in lines), False),
+        Column("mean NIS", "ideal: components per row", tuple(number(line.mean_nis, 3) for line in lines), False),
         Column("time", "per run", tuple(duration(line.seconds) for line in lines)),
         Column("failed", "", tuple(f"{line.failed:,}" if line.failed else "" for line in lines)),
     ]
