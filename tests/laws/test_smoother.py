@@ -217,7 +217,8 @@ def test_a_rough_measurement_counts_beside_precise_later_ones(estimator, ratio, 
 @pytest.mark.parametrize("seed", range(4))
 def test_passes_mend_what_the_filter_lost_over_a_gap(gap, seed):
     """Where a belief is long when the second pass begins, one linearisation over the gap is sigmas off; passes converge."""
-    prior, radar = pz.Gaussian([11.5, 0.0, 0.0, 9.7], 0.25 * np.eye(4)), pz.Station("radar", "range", 1e-4, {"mx": 10.0, "my": 0.0})
+    prior = pz.Gaussian([11.5, 0.0, 0.0, 9.7], 0.25 * np.eye(4))
+    radar = pz.Station("radar", "range", 1e-4, {"mx": 10.0, "my": 0.0})
     problem = b612(Q=[0.0] * 4, prior=prior, stations=[radar])
     first = np.arange(0.0, 4.0, 0.1)
     tracking = pz.simulate(problem, np.concatenate([first, gap + first]), np.random.default_rng(seed))
