@@ -82,8 +82,8 @@ class Smoother:
         if too_wide(problem, inputs, S):
             return self._beside_the_chain(problem, tracking)
         details: dict[str, Any] = {"cross_covariances": cross[: K - 1]} if self.cross_covariances else {}
-        first = Estimate(problem, tracking, mean, covariance, nu, S, K, seconds, "delayed", details=details)
-        return first if self.iterations == 1 or not first.success else self._again(first, watch)
+        once = Estimate(problem, tracking, mean, covariance, nu, S, K, seconds, "delayed", details=details)
+        return once if self.iterations == 1 or not once.success else self._again(once, watch)
 
     def _again(self, first: Estimate, watch: Stopwatch) -> Estimate:
         """Further passes: Gauss-Newton steps of all states, each taken as it is."""

@@ -167,7 +167,7 @@ def _beside_first(rows: Sequence[Row], estimates: Mapping[str, Estimate]) -> tup
     first = next((e for e in estimates.values() if e.success), None)
     if first is None:
         return tuple(rows)
-    views = {(name, e.view): e for name, own in estimates.items() for e in (own, own.delayed) if e is not None}
+    views: dict[tuple[str, str], Estimate] = {(name, e.view): e for name, own in estimates.items() for e in (own, own.delayed) if e is not None}
     others = {key: apart(first, e) for key, e in views.items() if e is not first}
     return tuple(replace(row, apart=others.get((row.estimator, row.view))) for row in rows)
 
