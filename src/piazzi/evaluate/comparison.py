@@ -167,9 +167,10 @@ def _beside_first(rows: Sequence[Row], estimates: Mapping[str, Estimate]) -> tup
     first = next((e for e in estimates.values() if e.success), None)
     if first is None:
         return tuple(rows)
-    views: dict[tuple[str, str], Estimate] = {(name, e.view): e for name, own in estimates.items() for e in (own, own.delayed) if e is not None}
-    others = {key: apart(first, e) for key, e in views.items() if e is not first}
-    return tuple(replace(row, apart=others.get((row.estimator, row.view))) for row in rows)
+    found: dict[tuple[str, str], float] = {}
+    for name, own in estimates.items():
+        found |= {(name, e.view): apart(first, e) for e in (own, own.delayed) if e is not None and e is not first}
+    return tuple(replace(row, apart=found.get((row.estimator, row.view))) for row in rows)
 
 
 def bounds_of(problem: Problem, tracking: Tracking) -> Bounds | None:
