@@ -142,6 +142,9 @@ def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, said:
         return _with_prior_before(text, problem, tracking)
     if kind != ".toml" and os.path.isfile(text):
         raise ValueError(f"{text}: files end in {', '.join(KINDS)}, not {kind!r}; those of tracking need a scenario")
+    from piazzi.determination.case_file import refuse_case
+
+    refuse_case(text)
     found = load_scenario(text)
     from piazzi.simulation import simulate
 

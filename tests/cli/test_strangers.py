@@ -19,6 +19,18 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.parametrize(
+    "command", ["compare", "windows", "observability", "study", "report", "propagate", "ephemeris", "difference"]
+)
+def test_tracking_of_the_package_is_no_problem_and_no_orbit_yet(call, place, command):
+    more = {"ephemeris": ["--from", "7090", "--when", "tonight"], "difference": ["b.oem"], "report": ["-o", "page.html"]}
+    found = call(command, "lageos-2", *more.get(command, []))
+    ending = ".oem" if command in ("propagate", "ephemeris", "difference") else ".toml"
+    assert (found.status, found.out) == (2, "")
+    assert f"lageos-2 is tracking: piazzi determine lageos-2 -o lageos-2{ending} makes" in found.err
+    assert len(found.err.splitlines()) == 1
+
+
 @pytest.mark.parametrize("command", ["compare", "estimate", "windows", "observability", "report", "simulate", "study"])
 @pytest.mark.parametrize(
     ("arguments", "words"),

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import piazzi as pz
+from piazzi.determination.earlier import earlier_of
 from tests.determination.fixing import EPOCH, observations, truth
 
 T = np.arange(0.0, 2 * 43200.0, 1200.0)
@@ -70,17 +71,37 @@ def test_what_was_used_is_left_out_and_counted(chain):
 def test_every_file_with_a_covariance_is_a_prior(chain, noisy, tmp_path):
     _, first, then = chain
     rows = observations(noisy, T, SIGMA)
-    for name in ("first.json", "first.nc", "first.ocm"):  # an OCM says which measurements it was made of
-        first.write(tmp_path / name)
-        again = pz.determine(rows, forces=KNOWN, prior=tmp_path / name)
-        assert sigmas_apart(then, again, then.epoch) < 1e-3, name
-    for name in ("first.oem", "first.opm"):
-        first.write(tmp_path / name)
-        with pytest.raises(ValueError, match=r"which measurements is it made of.*--from"):
-            pz.determine(rows, forces=KNOWN, prior=tmp_path / name)
-        again = pz.determine(rows, forces=KNOWN, prior=tmp_path / name, from_=EPOCH + 43200.0)
-        assert sigmas_apart(then, again, then.epoch) < 0.02, name
-        assert again.to_dict()["left_out"][f"measurements that {tmp_path / name} has used already"] == 3 * int(HALF.sum())
+    for name, apart in (
+        ("first.json", 1e-3),
+        ("first.nc", 1e-3),
+        ("first.ocm", 1e-3),
+        ("first.oem", 0.02),
+        ("first.opm", 0.02),
+    ):
+        path = tmp_path / name  # all of them say which measurements they were made of
+        first.write(path)
+        again = pz.determine(rows, forces=KNOWN, prior=path)
+        assert sigmas_apart(then, again, then.epoch) < apart, name
+        assert again.to_dict()["left_out"][f"measurements that {path} has used already"] == 3 * int(HALF.sum())
+    then.write(tmp_path / "then.opm")  # of a chain all measurements are told, those of the first orbit too
+    assert earlier_of(tmp_path / "then.opm", EPOCH).used[0] - EPOCH == pytest.approx(T[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("ending", ["oem", "opm"])
+@pytest.mark.parametrize("change", ["without", "twice", "reworded", "backwards"])
+def test_a_message_that_does_not_say_what_it_is_made_of_is_asked_about(chain, noisy, tmp_path, ending, change):
+    first, rows, path = chain[1], observations(noisy, T, SIGMA), tmp_path / f"first.{ending}"
+    first.write(path)
+    text = path.read_text()
+    line = next(line for line in text.splitlines(keepends=True) if line.startswith("COMMENT Measurements from"))
+    begin, end = line.removeprefix("COMMENT Measurements from ").removesuffix(".\n").split(" to ")
+    other = {"without": "", "twice": 2 * line, "reworded": line.replace("from", "of", 1)}
+    path.write_text(text.replace(line, other.get(change, f"COMMENT Measurements from {end} to {begin}.\n")))
+    assert earlier_of(path, EPOCH).used is None
+    with pytest.raises(ValueError, match=r"which measurements is it made of.*--from"):
+        pz.determine(rows, forces=KNOWN, prior=path)
+    again = pz.determine(rows, forces=KNOWN, prior=path, from_=EPOCH + 43200.0)
+    assert sigmas_apart(chain[2], again, chain[2].epoch) < 0.02
 
 
 def test_one_measurement_is_enough_beside_a_prior(chain, noisy):

@@ -48,6 +48,9 @@ def duration(text: str) -> float:
         raise click.BadParameter(str(error)) from None
 
 
+# arguments that stand for what `piazzi determine` makes of a case, with the ending of its file
+_OF_CASES = {"ORBIT": ".oem", "A": ".oem", "B": ".oem", "SOURCE": ".toml", "SCENARIO": ".toml"}
+
 seed = click.option("--seed", type=WholeNumber(0), metavar="N", default=0, show_default=True, help="Seed of simulation.")
 
 
@@ -83,7 +86,18 @@ class Command(click.Command):
 
     def invoke(self, ctx: click.Context) -> Any:
         check_places(ctx.params)
+        for param in self.params:
+            _no_case(ctx.params.get(param.name or ""), param.metavar or "")
         return super().invoke(ctx)
+
+
+def _no_case(given: Any, what: str) -> None:
+    """Raise ValueError where tracking of the package stands for an orbit or a problem that is yet to be made of it."""
+    if what not in _OF_CASES or not isinstance(given, str) or not re.fullmatch(r"\w+(-\w+)+", given):
+        return
+    from piazzi.determination.case_file import refuse_case
+
+    refuse_case(given, _OF_CASES[what])
 
 
 class Group(click.Group):

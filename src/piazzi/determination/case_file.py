@@ -59,6 +59,13 @@ def names() -> list[str]:
     return sorted(path.stem for path in CASES.glob("*.txt"))
 
 
+def refuse_case(given: str, ending: str = ".toml") -> None:
+    """Raise ValueError for the name of a case of the package, where a file with this ending is wanted that is made of one."""
+    if given in names() and not os.path.exists(given):
+        what = "a problem" if ending == ".toml" else "an orbit"
+        raise ValueError(f"{given} is tracking: piazzi determine {given} -o {given}{ending} makes {what} of it")
+
+
 def read_case(path: str | os.PathLike[str]) -> Case:
     """The case in a file; files that it names are looked for beside it first.  Raises OSError, ValueError."""
     from piazzi.scenarios.loader import tables_of

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -27,6 +28,9 @@ AIR_THEN = "density"  # the name of the air's density at the epoch
 SAME_TIME = 1.0  # s
 STATES = ("x", "y", "z", "vx", "vy", "vz")
 LARGEST = 2**26  # bytes of a determination
+HEADER = 2**14  # bytes of a message that comments stand in
+MADE_OF = "Measurements from {} to {}."  # the comment of OEM and OPM that says what was used
+_MADE_OF = re.compile(r"^COMMENT Measurements from (\S+ [A-Z0-9]+) to (\S+ [A-Z0-9]+)\.\r?$", re.MULTILINE | re.ASCII)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +99,21 @@ def earlier_of(given: Any, near: Epoch, chosen: str | None = None) -> Earlier:
     if start.covariance is None:
         raise ValueError(f"--prior {name}: {start.source} has no covariance: it can be a --guess, no prior")
     thumb = (f"the covariance of {name} is a rule of thumb, 1 km",) if "rule of thumb" in start.source else ()
-    return Earlier(start.epoch, start.state, start.covariance, name, used=start.used, assumed=thumb)
+    used = start.used or (_commented(given) if isinstance(given, str | os.PathLike) else None)
+    return Earlier(start.epoch, start.state, start.covariance, name, used=used, assumed=thumb)
+
+
+def _commented(path: str | os.PathLike[str]) -> tuple[Epoch, Epoch] | None:
+    """First and last measurement by the comment of an OEM or OPM of Piazzi; None where there is not one such line."""
+    with opened(path) as file:
+        header = file.read(HEADER).decode("utf-8", errors="replace").split("META_START")[0]
+    found = _MADE_OF.findall(header)
+    if not header.startswith(("CCSDS_OEM_VERS", "CCSDS_OPM_VERS")) or len(found) != 1:
+        return None
+    with suppress(ValueError):
+        first, last = (Epoch(text) for text in found[0])
+        return (first, last) if last - first >= 0 else None
+    return None
 
 
 def _facts_of(path: str | os.PathLike[str]) -> Mapping[str, Any] | None:
@@ -146,7 +164,7 @@ def _of_determination(facts: Mapping[str, Any], name: str) -> Earlier:
     J[:6, :6] = in_axes(frame, "GCRF", [epoch])[0]
     told = (*STATES, *(AIR_THEN if n == now else n for n in stays))
     about = str(facts.get("about", "earth"))
-    return Earlier(epoch, J @ mean[order], J @ P[np.ix_(order, order)] @ J.T, name, told, _used(facts), assumed, about)
+    return Earlier(epoch, J @ mean[order], J @ P[np.ix_(order, order)] @ J.T, name, told, used_by(facts), assumed, about)
 
 
 def density_now(facts: Mapping[str, Any], epoch: Epoch) -> str:
@@ -168,7 +186,7 @@ def _inflated(facts: Mapping[str, Any], name: str) -> tuple[float, tuple[str, ..
     return 1.0, ()
 
 
-def _used(facts: Mapping[str, Any]) -> tuple[Epoch, Epoch] | None:
+def used_by(facts: Mapping[str, Any]) -> tuple[Epoch, Epoch] | None:
     """First and last measurement, those of the orbits that it began with among them."""
     try:
         first, last = (Epoch(str(facts["span"][key])) for key in ("first", "last"))

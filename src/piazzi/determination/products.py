@@ -16,6 +16,7 @@ import numpy as np
 from piazzi.determination.arcs import dates_of, ephemeris, inflation, is_formal, one_state, scale_of
 from piazzi.determination.case_text import case_tables
 from piazzi.determination.document import document, solution
+from piazzi.determination.earlier import MADE_OF, used_by
 from piazzi.determination.residuals import table
 from piazzi.earth import Epoch
 from piazzi.earth.eop import mjd_text, tables
@@ -138,8 +139,9 @@ def comments(found: Any, formal: bool | None = None) -> Iterator[str]:
         yield f"Covariances are those of the fit times {factor**2:.3g}: residuals are {factor:.3g} times their sigmas."
     if found.notes.get("command"):
         yield f"Made by: {found.notes['command']}"
-    facts = document(found)
-    yield f"Measurements from {facts['span']['first']} to {facts['span']['last']}."
+    made_of = used_by(document(found))
+    if made_of is not None:
+        yield MADE_OF.format(*(when.to(scale_of(found)) for when in made_of))
     yield _age(dates_of(found, None)[1], found.setup.chosen.choice.eop)
 
 
