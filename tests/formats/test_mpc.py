@@ -102,6 +102,13 @@ def test_radar(tmp_path):
     np.testing.assert_allclose(table.sigma, [2.5e-6, 5.0])
 
 
+def test_lines_between_observations(tmp_path):
+    """Headings, rulers and remarks, as files of programs that determine orbits have them."""
+    lines = ("COM these are mine", "#Time sigma .001", "123456789|" * 8, "", LINE, "<-ObjDesig->*nnYYYY MM DD.DDDDD", LINE)
+    table = pz.read_tracking(mpc(tmp_path, *lines))
+    assert table.line.tolist() == [5, 5, 7, 7] and table.left_out == (("lines of text between observations", 3),)
+
+
 def test_radar_whose_frequency_is_whole_megahertz(tmp_path):
     """The columns of the magnitude have digits of the frequency and of the station then."""
     head = "00433".ljust(14) + "R" + "1992 12 02.902778"

@@ -327,3 +327,32 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path, old, new, line, says):
     with pytest.raises(ValueError, match=f": line {line}: ") as refusal:
         pz.read_ephemeris(tmp_path / "a")
     assert says in str(refusal.value)
+
+
+def test_opm_whose_metadata_have_marks(tmp_path):
+    """Other messages put them between META_START and META_STOP, and some write OPM and OMM so, too."""
+    text = """CCSDS_OPM_VERS = 2.0
+CREATION_DATE = 2017-06-21T13:20:25
+ORIGINATOR = X
+
+META_START
+OBJECT_NAME = A
+OBJECT_ID = 1998-067A
+CENTER_NAME = EARTH
+REF_FRAME = TEME
+TIME_SYSTEM = UTC
+META_STOP
+
+EPOCH = 2008-09-20T12:25:40.104192
+X = 3459023.611 [m]
+Y = 5617.725542 [km]
+Z = 1316.222323
+X_DOT = -3535.844 [m/s]
+Y_DOT = 3.550405
+Z_DOT = -5.846067 [km/s]
+"""
+    path = tmp_path / "a.opm"
+    path.write_text(text)
+    (arc,) = pz.read_ephemeris(path).arcs
+    np.testing.assert_allclose(arc.position, [[3459023.611, 5617725.542, 1316222.323]], rtol=1e-14)
+    np.testing.assert_allclose(arc.velocity, [[-3535.844, 3550.405, -5846.067]], rtol=1e-14)

@@ -22,6 +22,8 @@ AU = 149597870700.0  # m
 _ARCSECOND = math.pi / 648000.0
 _SECOND = {"s": "S", "v": "V", "r": "R"}  # second lines, and the first line that each belongs to
 _UTC = 36934  # 1960-01-01
+_TEXT = "lines of text between observations"
+_DATE = re.compile(r"\d{4} [ \d]\d [ \d]\d\.\d")
 _HEADER = re.compile(r"(COD|CON|OBS|MEA|TEL|NET|BND|COM|NUM|ACK|AC2|TYP|FNT|---)[ -]")  # of reports
 
 
@@ -54,6 +56,9 @@ def read(data: bytes, name: str, told: Conventions) -> Observations:
 def _take(reader: _Reader, text: str, line: int) -> None:
     text = text.rstrip()
     if _HEADER.match(text):
+        return
+    if text.startswith("#") or not _DATE.search(text):
+        reader.rows.skip(_TEXT)
         return
     if len(text) != 80:
         raise ValueError(f"an observation has 80 columns; this line has {len(text)}")

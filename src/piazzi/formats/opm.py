@@ -15,6 +15,7 @@ from piazzi.formats.odm import about, covariance_of, in_si, spacecraft_of, unkno
 from piazzi.formats.odm_keywords import ELEMENTS, MANOEUVRE, OMM, OPM, STATE
 from piazzi.formats.oem import check_version
 
+_MARKS = ("META_START", "META_STOP")  # of other messages, which some write around the metadata of these, too
 _WHO = ("OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM", "EPOCH")
 
 
@@ -42,7 +43,8 @@ def message_of(name: str, form: str, arcs: Sequence[Arc], mean: Sequence[MeanEle
 
 
 def _items(source: Source, data: bytes) -> list[Item]:
-    found = (key_value(source, text, k + 1) for k, text in enumerate(lines_of(data)))
+    lines = (("" if text.strip() in _MARKS else text, k) for k, text in enumerate(lines_of(data), 1))
+    found = (key_value(source, text, line) for text, line in lines)
     items = [item for item in found if item is not None]
     check_version(source, items[0])
     return items
