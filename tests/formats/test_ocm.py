@@ -111,3 +111,40 @@ def test_units_of_covariances_are_those_of_the_diagonal(tmp_path):
 def test_what_is_wrong_is_said_with_its_line(tmp_path, text, says):
     with pytest.raises(ValueError, match=says):
         read(tmp_path, text)
+
+
+def as_xml(text):
+    """The same message in XML."""
+    names = {"META": "metadata", **{k: k.lower() for k in ("TRAJ", "PHYS", "COV", "OD", "USER")}}
+    out, header = [], {}
+    kind = ""
+    for line in text.splitlines():
+        mark, _, what = line.partition("_")
+        if what in ("START", "STOP"):
+            kind = mark if what == "START" else ""
+            out.append(f"<{'' if kind else '/'}{names[mark]}>")
+        elif "=" in line and not line.startswith("COMMENT"):
+            key, value = (part.strip() for part in line.split("=", 1))
+            value, _, unit = value.partition(" [") if not value.startswith("[") else (value, "", "")
+            units = f' units="{unit.rstrip("]")}"' if unit else ""
+            (out if kind else header.setdefault("h", [])).append(f"<{key}{units}>{value}</{key}>")
+        elif line.strip() and not line.startswith("COMMENT"):
+            out.append(f"<{kind.lower()}Line>{line.replace(' ', chr(10), 1)}</{kind.lower()}Line>")
+    head = "".join(header["h"][1:])
+    return (
+        f'<?xml version="1.0"?>\n<ocm id="CCSDS_OCM_VERS" version="3.0"><header>{head}</header>\n' + "\n".join(out) + "\n</ocm>"
+    )
+
+
+def test_xml_says_the_same(tmp_path):
+    P = np.stack([covariance(1), covariance(2)])
+    one = arc(
+        covariance_t=np.array([0.0, 120.0]), covariance=P, covariance_frames=("GCRF", "GCRF"), spacecraft=(("mass", 7.0),)
+    )
+    text = ocm_text(one, determination={"OD_ID": "1", "OD_METHOD": "x", "OD_EPOCH": "2026-11-03T04:12:00"})
+    (kvn,), (xml,) = read(tmp_path, text).arcs, read(tmp_path, as_xml(text)).arcs
+    for name in ("position", "velocity", "t", "covariance", "covariance_t"):
+        np.testing.assert_array_equal(getattr(xml, name), getattr(kvn, name))
+    assert (xml.name, xml.frame, xml.spacecraft, xml.said) == (kvn.name, kvn.frame, kvn.spacecraft, kvn.said)
+    with pytest.raises(ValueError, match=r"line \d+: TRAJ_TYPE is given twice"):
+        read(tmp_path, as_xml(text).replace("<TRAJ_TYPE>", "<TRAJ_TYPE>CARTPV</TRAJ_TYPE><TRAJ_TYPE>"))

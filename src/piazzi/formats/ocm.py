@@ -27,7 +27,7 @@ _SPACECRAFT = {
 FIRST, LAST = "DAYS_SINCE_FIRST_OBS", "DAYS_SINCE_LAST_OBS"
 
 
-class _Block(NamedTuple):
+class OcmBlock(NamedTuple):
     """A block of a message: its kind, its keywords, its other lines with their numbers, and the line where it begins."""
 
     kind: str
@@ -65,12 +65,16 @@ def read(data: bytes, name: str, told: Conventions) -> Ephemeris:
         With file, line and reason.
     """
     source = Source(name)
-    header, blocks = _blocks(source, data)
+    return ephemeris_of(source, *_blocks(source, data))
+
+
+def ephemeris_of(source: Source, header: Sequence[Item], blocks: Sequence[OcmBlock]) -> Ephemeris:
+    """Arcs of a message; ValueError as `read`."""
     if not header or header[0].keyword != "CCSDS_OCM_VERS" or header[0].text not in ("3.0", "3"):
         source.refuse(1, "the version of the OCM is not 3.0, which is read")
     meta = next((block for block in blocks if block.kind == "META"), None)
     if meta is None:
-        source.refuse(1, "the message has no META_START")
+        source.refuse(1, "the message has no metadata (META_START)")
     needed(source, meta.found, ("TIME_SYSTEM", "EPOCH_TZERO"), "the metadata", meta.line)
     scale = source.scale(meta.found["TIME_SYSTEM"])
     clock = _Clock(source, scale, source.date(meta.found["EPOCH_TZERO"], scale))
@@ -92,7 +96,7 @@ def read(data: bytes, name: str, told: Conventions) -> Ephemeris:
     scaled = any({"COV_SCALE_MIN", "COV_SCALE_MAX"} & {*block.found} for block in blocks)
     left = len(ways) - len(read_)
     return Ephemeris(
-        arcs=tuple(arcs), file=name, format="OCM", said=tuple((item.keyword, item.text) for item in header),
+        arcs=tuple(arcs), file=source.name, format="OCM", said=tuple((item.keyword, item.text) for item in header),
         assumed=("COV_SCALE_MIN and COV_SCALE_MAX are not applied to covariances",) if scaled else (),
         open=unknown_axes(frames), left_out=(("trajectories of elements", left),) if left else (),
     )  # fmt: skip
@@ -109,9 +113,9 @@ def used_by(arc: Arc) -> tuple[Epoch, Epoch] | None:
     return first, last
 
 
-def _blocks(source: Source, data: bytes) -> tuple[list[Item], list[_Block]]:
+def _blocks(source: Source, data: bytes) -> tuple[list[Item], list[OcmBlock]]:
     """The items of the header, and all blocks."""
-    header, blocks = list[Item](), list[_Block]()
+    header, blocks = list[Item](), list[OcmBlock]()
     items, rows, kind, begun = header, list[tuple[int, str]](), "", 0
     for number, raw in enumerate(lines_of(data), start=1):
         text = raw.strip()
@@ -120,7 +124,7 @@ def _blocks(source: Source, data: bytes) -> tuple[list[Item], list[_Block]]:
             if (mark[2] == "START") == bool(kind) or (mark[2] == "STOP" and mark[1] != kind):
                 source.refuse(number, f"{text} stands {f'in the block of line {begun}' if kind else 'where no block begins'}")
             if mark[2] == "STOP":
-                blocks.append(_Block(kind, _by_keyword(source, items, kind), rows, begun))
+                blocks.append(block_of(source, kind, items, rows, begun))
             items, rows, kind, begun = [], [], mark[1] if mark[2] == "START" else "", number
         elif "=" in text and not text.startswith("COMMENT"):
             item = key_value(source, text, number)
@@ -135,14 +139,14 @@ def _blocks(source: Source, data: bytes) -> tuple[list[Item], list[_Block]]:
     return header, blocks
 
 
-def _by_keyword(source: Source, items: Sequence[Item], kind: str) -> dict[str, Item]:
-    """Items of a block; those of physics and of users may come again."""
+def block_of(source: Source, kind: str, items: Sequence[Item], rows: list[tuple[int, str]], line: int) -> OcmBlock:
+    """A block with its items by keyword; those of physics and of users may come again."""
     if kind in ("META", "TRAJ", "COV", "OD"):
-        return single(source, items, f"a block {kind}")
-    return {item.keyword: item for item in items}
+        return OcmBlock(kind, single(source, items, f"a block {kind}"), rows, line)
+    return OcmBlock(kind, {item.keyword: item for item in items}, rows, line)
 
 
-def _arc(block: _Block, clock: _Clock, meta: _Block, said: Any, craft: Any) -> Arc:
+def _arc(block: OcmBlock, clock: _Clock, meta: OcmBlock, said: Any, craft: Any) -> Arc:
     source, kind = clock.source, block.word("TRAJ_TYPE", "").upper()
     width = _STATES[kind]
     rows = [(number, text.split()) for number, text in block.rows]
@@ -179,7 +183,7 @@ def _axes(text: str) -> str:
     return "ICRF" if re.fullmatch(r"ICRF\d?", name) else frame_named(name)
 
 
-def _covariances(source: Source, block: _Block, clock: _Clock) -> Iterator[tuple[Epoch, Array, str]]:
+def _covariances(source: Source, block: OcmBlock, clock: _Clock) -> Iterator[tuple[Epoch, Array, str]]:
     """Date, covariance (6, 6) and axes of each row of a block, of positions and velocities; others are passed over."""
     kind, order = block.word("COV_TYPE", "CARTPV").upper(), block.word("COV_ORDERING", "LTM").upper()
     if kind not in ("CARTPV", "CARTPVA"):
@@ -200,7 +204,7 @@ def _covariances(source: Source, block: _Block, clock: _Clock) -> Iterator[tuple
         yield clock(words[0], number), (P * np.outer(factors, factors))[:6, :6], frame
 
 
-def _factors(source: Source, block: _Block, keyword: str, usual: Sequence[str], power: int = 1) -> Array:
+def _factors(source: Source, block: OcmBlock, keyword: str, usual: Sequence[str], power: int = 1) -> Array:
     """Factors (n,) of columns to SI, by the units that a block states or those of the standard.
 
     Units of covariances are of its diagonal, such as km**2; `power` is 2 there.

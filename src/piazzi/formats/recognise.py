@@ -81,6 +81,7 @@ FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
     "OMM JSON": Format(_begins(rb"(?:\[\s*)?\{[^{}]*\"MEAN_MOTION\"\s*:"), ephemeris="gp:read_json"),
     "OMM table": Format(_begins(rb"(?=[^\n]*\bEPOCH\b)[^\n]*\bMEAN_MOTION\b[^\n]*,"), ephemeris="gp:read_csv"),
     "TLE": Format(_begins(rb"(?:[^\n]*\n)?1 [ 0-9A-Z]{5}[ A-Z] .{8} \d\d[ \d]{3}\."), ephemeris="tle:read"),
+    "OCM XML": Format(_root(rb"ocm"), ephemeris="ocm_xml:read_xml"),
     "OEM XML": Format(_root(rb"(?:oem|opm|omm|ndm)"), ephemeris="odm_xml:read"),
     "MPC": Format(_has_line(rb"[^\n]{15}\d{4} [ \d]\d [ \d]\d[^\n]{54}\S[ \r]*$"), tracking="mpc:read"),
     "IOD": Format(_has_line(rb"[ \d]{5} [ \d]{2} [ \d]{3}[A-Z ]{3} \d{4} [A-Z ] \d{8}"), tracking="visual:read_iod"),
