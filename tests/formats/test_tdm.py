@@ -320,3 +320,32 @@ def test_ranges_in_range_units_are_metres_once_their_length_is_said(data_dir):
     for said, what in (("3 kg", "is a length"), ("short", "is a length"), ("-1m", "is a length"), ("X=1m", "no such station")):
         with pytest.raises(ValueError, match=what):
             pz.read_tracking(path, range_unit=said)
+
+
+def test_messages_after_one_another_are_one_file(tmp_path):
+    one = """CCSDS_TDM_VERS = 2.0
+CREATION_DATE = 2011-05-12T00:00:00
+ORIGINATOR = X
+META_START
+TIME_SYSTEM = UTC
+PARTICIPANT_1 = A
+PARTICIPANT_2 = SAT
+MODE = SEQUENTIAL
+PATH = 2,1
+ANGLE_TYPE = AZEL
+META_STOP
+DATA_START
+ANGLE_1 = 2011-05-11T10:26:33 191.4
+ANGLE_2 = 2011-05-11T10:26:33 25.4
+DATA_STOP
+"""
+    path = tmp_path / "two.tdm"
+    path.write_text(one + "\n" + one.replace("10:26:33", "10:26:43").replace("1 = A", "1 = B"))
+    table = pz.read_tracking(path)
+    assert table.line.tolist() == [13, 14, 29, 30] and {*table.stations} == {"A", "B"}
+    path.write_text(one + one.replace("VERS = 2.0", "VERS = 7.0"))
+    with pytest.raises(ValueError, match=r"line 16: the version of the TDM is '7\.0'"):
+        pz.read_tracking(path)
+    path.write_text(one + "ORIGINATOR = Y\n" + one)
+    with pytest.raises(ValueError, match="line 16: 'ORIGINATOR' stands between segments"):
+        pz.read_tracking(path)

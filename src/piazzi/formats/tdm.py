@@ -37,7 +37,7 @@ def read_kvn(data: bytes, name: str, told: Conventions) -> Observations:
     where, line, first = 0, 1, True
     while where < len(data):
         items, where, line, mark = _until_mark(source, data, where, line)
-        if first:
+        if first or (items and items[0].keyword == "CCSDS_TDM_VERS"):  # messages may follow one another
             _check_header(source, items)
         elif items:
             source.refuse(items[0].line, f"{shown(items[0].keyword)} stands between segments")
