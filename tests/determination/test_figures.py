@@ -1,12 +1,13 @@
 """Pictures and tables of a determination for papers, against what they are of."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import piazzi as pz
-from piazzi.determination.figures import drawn, formats_of, width_of
+from piazzi.determination.figures import drawn, formats_of, view, width_of
 from piazzi.determination.page.ecliptic import ellipse
 from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.latex import as_latex
@@ -106,17 +107,27 @@ def test_an_orbit_in_space_is_seen_from_three_sides_and_from_aslant(found):
     *sides, space = figure.axes
     assert [(ax.get_xlabel()[0], ax.get_ylabel()[0]) for ax in sides] == [("x", "y"), ("z", "y"), ("x", "z")]
     assert {ax.get_xlim() + ax.get_ylim() for ax in sides} == {sides[0].get_xlim() * 2}
-    place, behind = found.estimate.mean[:, :3] / 1e6, []
+    place = found.estimate.mean[:, :3] / 1e6
     for ax, (i, j) in zip(sides, ((0, 1), (2, 1), (0, 2)), strict=True):
         pieces = [np.stack(line.get_data(), axis=1) for line in ax.lines]
         points = np.concatenate([piece[np.isfinite(piece).all(axis=1)] for piece in pieces])
         nearest = np.linalg.norm(points[None] - place[::8, [i, j]][:, None], axis=2).min(axis=1)
-        assert nearest.max() < 0.3  # of 7, a sixteenth of a revolution at the most
-        hidden = [line for line in ax.lines if line.get_linestyle() == ":"]
-        assert all(np.nanmax(np.hypot(*line.get_data())) < 6.378137 for line in hidden)
-        behind += hidden
-    assert behind
+        assert nearest.max() < 1.0  # of 26, a sixteenth of a revolution at the most
     assert not space.axison and [text.get_text() for text in space.texts] == ["x", "y", "z"]
+
+
+def test_what_is_behind_the_earth_is_dotted():
+    """Seen from -y, with x to the right and z up, the half with y > 0 is behind."""
+    from matplotlib.figure import Figure
+
+    turn = np.linspace(0.0, 2 * np.pi, 400)
+    place = 7e6 * np.stack([np.cos(turn), 0.8 * np.sin(turn), 0.6 * np.sin(turn)], axis=1)
+    path = SimpleNamespace(about="earth", mean=np.hstack([place, place]))
+    ax = view(Figure().add_subplot(), path, 3.986e14, 0, 2)
+    seen, hidden = (np.isfinite(line.get_xdata()) for line in ax.lines)
+    assert [line.get_linestyle() for line in ax.lines] == ["-", ":"]
+    assert np.array_equal(hidden, (np.hypot(place[:, 0], place[:, 2]) < 6378137.0) & (place[:, 1] > 0))
+    assert np.array_equal(seen, ~hidden)
 
 
 def test_the_whole_ellipse_is_that_of_the_state():

@@ -1,7 +1,6 @@
 """The page of a determination in a browser: globe, map, skies, residuals; each against a formula written here."""
 
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from piazzi.determination.residuals import table
 from piazzi.present.land import land
 from piazzi.present.report import write_page
 from tests.determination.fixing import observations, truth
+from tests.present.looks import check_looks
 
 T = np.arange(0.0, 43200.0, 900.0)
 SIGMA = 5.0
@@ -226,33 +226,9 @@ def test_every_drawing_is_saved(open_page, report, kind, begins):
         assert download.value.suggested_filename.endswith(f".{kind}")
 
 
-UNNAMED = """() => [...document.querySelectorAll("button, input, select, a, [tabindex], svg[role=img]")].filter((e) =>
-  !(e.getAttribute("aria-label") || e.getAttribute("aria-labelledby") || e.textContent.trim() || e.closest("label")))
-  .map((e) => e.outerHTML.slice(0, 120))"""
-CONTRAST = """() => { const parse = (c) => { const m = c.match(/[\\d.]+/g).map(Number); return [m[0], m[1], m[2], m[3] ?? 1]; };
-  const linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
-  const light = (c) => { const [r, g, b] = c.slice(0, 3).map((v) => linear(v / 255));
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
-  const paper = (e) => { for (let n = e; n; n = n.parentElement) {
-    const c = parse(getComputedStyle(n).backgroundColor); if (c[3] === 1) return c; } };
-  const out = [];
-  for (const e of document.querySelectorAll("body *")) {
-    if (e.closest("noscript, script, #tip") || !e.checkVisibility({ visibilityProperty: true })) continue;
-    if (![...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim())) continue;
-    const svg = e instanceof SVGElement; const ink = parse(svg ? getComputedStyle(e).fill : getComputedStyle(e).color);
-    const [a, b] = [light(ink), light(paper(e))]; const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-    if (ratio < 4.5) out.push([e.tagName, e.className.baseVal ?? e.className, e.textContent.slice(0, 30), ratio]);
-  } return out; }"""
-
-
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_letters_stand_out_and_everything_has_a_name(open_page, report, scheme):
-    page = open_page(report, scheme=scheme)
-    page.evaluate("() => document.querySelectorAll('details').forEach((d) => (d.open = true))")
-    assert page.evaluate(UNNAMED) == []
-    assert page.evaluate(CONTRAST) == []
-    levels = page.evaluate("() => [...document.querySelectorAll('h1, h2, h3, h4')].map((h) => Number(h.tagName[1]))")
-    assert levels[0] == 1 and all(b - a <= 1 for a, b in pairwise(levels))
+    check_looks(open_page(report, scheme=scheme))
 
 
 @pytest.mark.parametrize("width", [360, 1280])

@@ -11,6 +11,7 @@ from piazzi.present.figures.studies import study_pages
 from piazzi.present.grid import Scale, colour, file_name, letters, measures, shares, spreads
 from piazzi.study import run_study
 from piazzi.study.grid import Grid
+from tests.present.looks import check_looks
 from tests.study.studies import small
 
 SCALES, LAGS = (0.5, 1, 50), (3, 10)
@@ -174,3 +175,21 @@ def test_nothing_of_the_page_is_wider_than_a_phone(open_page, study_page, scheme
     for _ in range(2):
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         page.get_by_role("combobox", name="R.scale").select_option("50")
+        check_looks(page)
+
+
+def test_of_many_points_there_are_maps_and_no_pictures_of_some(stored, monkeypatch):
+    from piazzi.present.figures import studies
+
+    monkeypatch.setattr(studies, "MOST_POINTS", 2)
+    names = [name for name, _ in study_pages(stored.summary)]
+    assert names and all(name.startswith(("study-against-", "study-map-")) for name in names)
+
+
+def test_points_without_a_tab_are_told_of(stored, monkeypatch):
+    from piazzi.present.report import study
+
+    monkeypatch.setattr(study, "MOST_TABS", 2)
+    whole, *points = study.study_tabs(stored.summary, "Grid")
+    assert len(points) == 2
+    assert "2 of 3 points have a page of their own" in whole.sections[-1].blocks[0].paragraphs[-1]

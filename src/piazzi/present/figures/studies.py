@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_POINTS = 12  # that get pictures of their own
+MOST_POINTS = 12  # with pictures of their own: of more, maps and lines show them all
 FEW = 4  # lines whose bands can be told apart
 
 
@@ -38,7 +38,7 @@ def study_pages(summary: Summary, title: str = "") -> Iterator[tuple[str, Figure
 
     yield from grid_pages(summary, _heading(summary, title))
     rows = len(summary.stored.rows)
-    for index in range(min(len(summary.stored.points), MOST_POINTS)):
+    for index in range(len(summary.stored.points) if len(summary.stored.points) <= MOST_POINTS else 0):
         lines = list(summary.lines[index * rows : (index + 1) * rows])
         tail = f"-{file_name(point_of(summary, index))}" if len(summary.stored.points) > 1 else ""
         for name, draw in (("errors", error_page), ("nees", nees_page), ("cost", cost_page)):

@@ -56,7 +56,9 @@ def _whole(summary: Summary, grid: Grid, name: str) -> Tab:
 
 
 def _reading(summary: Summary) -> Section:
-    return Section("How to read this", [Text([*_READING, *failures(summary)])])
+    points = len(summary.stored.points)
+    cut = [f"The first {MOST_TABS} of {points:,} points have a page of their own here."] if points > MOST_TABS else []
+    return Section("How to read this", [Text([*_READING, *failures(summary), *cut])])
 
 
 def _tab(summary: Summary, index: int, name: str, grid: Grid | None = None) -> Tab:
