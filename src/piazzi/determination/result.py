@@ -200,7 +200,7 @@ class Determination:
         ----------
         ax : matplotlib Axes; polar ones for the sky
         what : "residuals", "sigma" (of position along R, T and N), "orbit", "ground-track" or "sky"
-        which : the kind of residuals, the plane of the orbit ("xy", "yz", "xz") or "space", the station of a sky; default the first
+        which : the kind of residuals, the plane of the orbit ("xy", "yz", "xz", "space"), the station of a sky; else the first
 
         Raises
         ------
