@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -168,10 +168,18 @@ class Chain:
             return np.asarray((self.H @ rows[:, :, None])[:, :, 0])
 
     def cost_rounding(self) -> float:
-        """How much of the cost may be rounding of the states."""
+        """How much of the cost may be rounding of the states, and of what they should measure."""
         rows = np.repeat(np.abs(self.x), np.diff(self.inputs.first_row), axis=0)
         with np.errstate(all="ignore"):
-            return float(np.nansum(np.abs(self.nu) * (np.abs(self.H) @ (ROUNDING * rows)[:, :, None])[:, :, 0]))
+            bits = (np.abs(self.H) @ (ROUNDING * rows)[:, :, None])[:, :, 0] + self.measured_bits
+            return float(np.nansum(np.abs(self.nu) * bits))
+
+    @cached_property
+    def measured_bits(self) -> Array:
+        """How much of each measurement (J, m) is rounding, in units of its noise: a frequency of 0.1 Hz has many digits."""
+        eps, width = float(np.finfo(float).eps), self.inputs.z.shape[1]
+        limits = np.array([[*row, *[np.inf] * width][:width] for row in self.problem.station_limits])
+        return np.asarray(ROUNDING / eps * np.abs(self.inputs.z) / limits[self.inputs.station])
 
     def innovations(self) -> tuple[Array, Array]:
         """Innovations and their covariances along the final linearisation, (J, m) and (J, m, m)."""

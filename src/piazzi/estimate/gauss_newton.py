@@ -59,8 +59,9 @@ def optimize(
             return Outcome(chain.P_pred, iteration, TOO_WIDE, _figures(chain, solver, costs))
         size = _size(chain)
         ahead = past.step(chain, size)
-        at_rounding = _at_rounding(chain, solver, size, before, tolerance)
-        if isfinite(cost) and (at_rounding or _distance(chain, size, ahead) <= tolerance):
+        near = _distance(chain, size, ahead) <= tolerance
+        at_rounding = not near and _at_rounding(chain, solver, size, before)
+        if isfinite(cost) and (at_rounding or near):
             covariance = _ended(chain, solver, ahead, SMALL_STEP if at_rounding else tolerance)
             if covariance is not None:
                 failure, stopped = "", "steps are rounding" if at_rounding else f"no step above {tolerance:g} sigma"
@@ -99,9 +100,9 @@ def _distance(chain: Chain, size: float, ahead: Array | None) -> float:
     return size if ahead is None else max(size, _measured(chain, ahead))
 
 
-def _at_rounding(chain: Chain, solver: Solver, size: float, before: float, tolerance: float) -> bool:
-    """Whether a step of this size is nothing but rounding."""
-    stuck = SMALL_STEP > size > max(SHRINKING * before, tolerance) and not chain.reweighted
+def _at_rounding(chain: Chain, solver: Solver, size: float, before: float) -> bool:
+    """Whether a step of this size is nothing but rounding, and so where it seems to lead."""
+    stuck = SMALL_STEP > size > SHRINKING * before and not chain.reweighted
     return (
         stuck
         and size <= MOST_AMPLIFIED * _measured(chain, _last_bits(chain))
@@ -128,12 +129,12 @@ def _measured(chain: Chain, changes: Array) -> float:
 def _rounding(chain: Chain, solver: Solver) -> float:
     """How much of a step may be rounding: what changes, in the measure of `_size`, where states are rounded otherwise.
 
-    The last bits of all states decide the last bits of what the dynamics make of them.
+    The last bits of all states decide the last bits of what the dynamics make of them, and measurements have last bits, too.
     """
     f, nu, step = chain.f.copy(), chain.nu.copy(), chain.dx.copy()
     bits = _last_bits(chain)
     chain.f[:-1] += bits[1:]
-    chain.nu += chain.by_measurement(bits)
+    chain.nu += chain.by_measurement(bits) + chain.measured_bits * np.random.default_rng(1).uniform(-1.0, 1.0, chain.nu.shape)
     solver.solve(0.0)
     chain.f[:], chain.nu[:] = f, nu
     other = chain.dx.copy()
