@@ -9,10 +9,12 @@ import numpy as np
 
 from piazzi.determination.earlier import root_of
 from piazzi.determination.setup import Setup, follow
+from piazzi.determination.sweep import swept
 from piazzi.estimate.batch import undisturbed
-from piazzi.evaluate.information import NEGLIGIBLE, along, factor, predicted
+from piazzi.evaluate.information import NEGLIGIBLE, along, factor, predicted, whitened
+from piazzi.problem import Problem
 from piazzi.problem.checks import Array
-from piazzi.problem.inputs import prepare, wrapped
+from piazzi.problem.inputs import Inputs, prepare, wrapped
 from piazzi.text import brief
 
 
@@ -67,30 +69,39 @@ def of_orbit(root: Array) -> Array:
     return whole[-6:, -6:]
 
 
-def analysed(given: Setup, states: Array) -> Analysis:
-    """Of states (K, n) at all epochs, as one orbit without process noise."""
+def analysed(given: Setup, states: Array, derivatives: Array | None = None) -> Analysis:
+    """Of states (K, n) at all epochs, as one orbit without process noise; `derivatives` (K, n, n) are by the first of them."""
     problem = given.problem if given.problem.is_noise_free else undisturbed(given.problem)
     inputs = prepare(problem, given.tracking)
     with np.errstate(all="ignore"):
-        shot = along(problem, inputs, states)
+        innovations, rows = _seen(problem, inputs, states, derivatives, given.chosen.max_step)
         computed = predicted(problem, inputs, states)
-    J, m = inputs.z.shape
     stations = given.tracking.stations_of(problem)
     sigma = np.sqrt(np.diagonal(problem.station_noise, axis1=1, axis2=2))[stations]
     full = problem.station_correlated[stations].astype(np.bool_)[:, None]
     # along an angle on the sky, as kernels have it; of components with a full covariance whitened ones are mixed
     apart = wrapped(problem, stations, inputs.z - computed)
-    residual = np.where(full, apart, shot.innovations * sigma)
-    rows = shot.rows.reshape(J, m, -1)
+    residual = np.where(full, apart, innovations * sigma)
     if given.before is not None:
-        return Analysis(residual, inputs.z - apart, shot.innovations, rows, *_known_before(given, given.before, states[0]))
+        return Analysis(residual, inputs.z - apart, innovations, rows, *_known_before(given, given.before, states[0]))
     constants = 6  # and processes, of which as much is known
     spread = np.sqrt(np.diag(problem.covariance))[constants:]
     known = np.flatnonzero(spread > 0)
     prior = np.zeros((len(known), problem.model.n))
     prior[np.arange(len(known)), constants + known] = 1.0 / spread[known]
     miss = (states[0, constants:] - problem.mean[constants:])[known] / spread[known]
-    return Analysis(residual, inputs.z - apart, shot.innovations, rows, prior, -miss)
+    return Analysis(residual, inputs.z - apart, innovations, rows, prior, -miss)
+
+
+def _seen(problem: Problem, inputs: Inputs, states: Array, derivatives: Array | None, step: float) -> tuple[Array, Array]:
+    """Whitened residuals (J, m), and minus their derivatives (J, m, n) by the first state."""
+    if not problem.is_noise_free or not np.isfinite(states[0]).all():
+        shot = along(problem, inputs, states)
+        return shot.innovations, shot.rows.reshape(*inputs.z.shape, -1)
+    if derivatives is None:
+        derivatives = swept(problem, inputs.t, states[0], step)[1]
+    innovations, rows = whitened(problem, inputs, states)
+    return innovations, rows @ derivatives[np.repeat(np.arange(inputs.epochs), np.diff(inputs.first_row))]
 
 
 def _known_before(given: Setup, before: tuple[Array, Array], first: Array) -> tuple[Array, Array]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from piazzi.determination.analysis import analysed
 from piazzi.determination.setup import Setup, follow, scale_of, with_prior
+from piazzi.determination.sweep import swept
 from piazzi.evaluate.information import factor
 from piazzi.orbit import ModifiedEquinoctial
 from piazzi.problem.checks import Array
@@ -25,6 +26,7 @@ STILL = 1e-3  # of the cost, by which a step must lower it to be followed by ano
 LARGEST = 1e10  # of the damping
 LEAST = 1e-8
 WIDER = 100.0  # times the sigma that measurements leave is that of the prior: a share of 1e-4 of what they know
+ROUGHLY = 2.0  # times the steps of the answer are those of trials: millimetres in a day
 SPREAD = 2.5  # times the median residual, from which on a row counts less and less
 
 
@@ -114,13 +116,13 @@ def _state_at(given: Setup, t: float) -> Array:
 
 def _place(given: Setup, begun: float, first: Array) -> Place | None:
     """All that follows from a state; None where the orbit ends, or measurements have no prediction."""
-    times, step = given.tracking.times, given.chosen.max_step
+    times, step = given.tracking.times, ROUGHLY * given.chosen.max_step
     try:
         gap = begun - float(times[0])
         nodes = np.linspace(begun, float(times[0]), max(ceil(gap / step), 1) + 1) if gap > 0 else np.array([begun])
         back, Phi = follow(given.problem, nodes, first, step)
-        states = follow(given.problem, times, back[-1], step)[0]
-        found = analysed(given, states)
+        states, derivatives = swept(given.problem, times, back[-1], step)
+        found = analysed(given, states, derivatives)
         change = _change(first, given.measured.centre.mu)
     except ValueError:
         return None

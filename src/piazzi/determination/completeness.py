@@ -15,10 +15,11 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis, of_orbit
 from piazzi.determination.setup import Setup, follow, scale_of
+from piazzi.determination.sweep import products, swept
 from piazzi.earth import Forces, Gravity
 from piazzi.earth.defaults import AIR_BELOW, DRAGGED, REFLECTED, lowest_height
 from piazzi.earth.force_text import Force
-from piazzi.evaluate.information import along, singular
+from piazzi.evaluate.information import singular, whitened
 from piazzi.expressions import evaluate_arrays
 from piazzi.model.definitions import needed
 from piazzi.model.values import with_arrays
@@ -72,7 +73,7 @@ def _gravity(given: Setup, states: Array) -> Iterator[tuple[str, Array]]:
     inputs, times, step = prepare(given.problem, given.tracking), given.tracking.times, given.chosen.max_step
     with np.errstate(all="ignore"):  # whitened; by the same sensors: the field is the orbit's
         here, there = (
-            along(given.problem, inputs, follow(problem, times, states[0], step)[0]).innovations
+            whitened(given.problem, inputs, swept(problem, times, states[0], step)[0])[0]
             for problem in (given.problem, larger)
         )
     yield f"gravity to degree {more} instead of {f'degree {degree}' if degree > 1 else 'the Earth as a point'}", here - there
@@ -87,11 +88,7 @@ def _others(given: Setup, states: Array, analysis: Analysis) -> Iterator[tuple[s
     if not t[-1] > t[0]:
         return
     path, Phi = follow(given.problem, t, states[0], given.chosen.max_step)
-    back = np.empty((len(t), 6, 3))  # of the first state, by a change of velocity at each time
-    now = np.eye(path.shape[1])
-    for k in range(len(t)):
-        now = Phi[k - 1] @ now if k else now
-        back[k] = np.linalg.solve(now[:6, :6], np.eye(6)[:, 3:])
+    back = np.linalg.solve(products(Phi)[:, :6, :6], np.eye(6)[:, 3:])  # of the first state, by a change of velocity at each time
     for name, pull in _pulls(given, t, path):
         rate = (back @ pull[:, :, None])[..., 0]
         total = np.vstack([np.zeros(6), np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)[:, None], axis=0)])

@@ -16,7 +16,8 @@ import numpy as np
 from piazzi.determination.analysis import Analysis, analysed, of_orbit
 from piazzi.determination.fit import estimate
 from piazzi.determination.ranging import GAP
-from piazzi.determination.setup import Setup, follow, scale_of
+from piazzi.determination.setup import Setup, scale_of
+from piazzi.determination.sweep import swept
 from piazzi.earth.stepping import turning
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate, Estimator
@@ -177,10 +178,10 @@ def _by_steps(given: Setup, answer: Estimate, analysis: Analysis, rest: Array, r
             break
         first = first + unit * step
         try:
-            states = follow(given.problem, given.tracking.times, first, given.chosen.max_step)[0]
+            states, derivatives = swept(given.problem, given.tracking.times, first, given.chosen.max_step)
         except ValueError:
             return None
-        here = analysed(given, states)
+        here = analysed(given, states, derivatives)
         if not np.isfinite(here.whitened[rows][np.isfinite(given.tracking.values[rows])]).all():
             return None
     own = np.nan_to_num(here.rows[rows]) * unit

@@ -98,6 +98,7 @@ class Tabulated:
         return self.pieces(float(t.min()), float(t.max()))(t)[0]
 
 
+@lru_cache(maxsize=DAYS)
 def _of_day(epoch: Epoch) -> tuple[float, float]:
     """Seconds of the day of UTC, whole and the rest."""
     seconds, fraction = epoch.reading("UTC" if epoch.whole > _UTC_FROM else "TT")[2:]

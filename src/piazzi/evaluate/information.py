@@ -94,12 +94,28 @@ def predicted(problem: Problem, inputs: Inputs, states: Array) -> Array:
     """Noiseless measurements (J, m) of states (K, n), NaN where a sensor has fewer components."""
     run, p, measured, _ = inputs.bundles(problem)
     noiseless = Noiseless(states=np.ascontiguousarray(states), z=np.empty_like(inputs.z))
-    _library(problem).predict_rows(run, p, measured, noiseless)
+    _of_rows(problem).predict_rows(run, p, measured, noiseless)
     return noiseless.z  # type: ignore[no-any-return]
 
 
+def whitened(problem: Problem, inputs: Inputs, states: Array) -> tuple[Array, Array]:
+    """Whitened innovations (J, m) at states (K, n), NaN where missing, and minus their derivatives (J, m, n) by these."""
+    N, (J, M) = problem.model.n, inputs.z.shape
+    run, p, measured, _ = inputs.bundles(problem)
+    seen = Observation(
+        states=np.ascontiguousarray(states, dtype=float), innovations=np.empty((J, M)), rows=np.empty((J, M, N))
+    )
+    _of_rows(problem).whiten_rows(run, p, measured, seen)
+    return seen.innovations, seen.rows
+
+
+def _of_rows(problem: Problem) -> SimpleNamespace:
+    """What moves nothing; of models whose motion is compiled into every kernel, a part of the one that does."""
+    return kernels.load(problem.spec("decorrelate", "rows")) if problem.functions else _library(problem)
+
+
 def _library(problem: Problem) -> SimpleNamespace:
-    return kernels.load(problem.spec("transition", problem.noise_fragment, "decorrelate", "observe"))
+    return kernels.load(problem.spec("transition", problem.noise_fragment, "decorrelate", "rows", "observe"))
 
 
 def _observe(problem: Problem, inputs: Inputs, states: Array, *, follow: bool) -> Shot:

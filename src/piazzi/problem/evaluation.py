@@ -120,7 +120,7 @@ def singular_equation(
     for state, equation in zip(model.states, model.dynamics, strict=True):
         if not np.isfinite(evaluate(equation, values)):
             return f"the dynamics of {state!r} have no finite value at the prior mean ({at})"
-    for station in stations:
+    for station in _unlike(stations):
         sensor = model.sensor(station.sensor)
         for component, equation in zip(sensor.components, sensor.equations, strict=True):
             there = dict(functions) | {STATION: _Held(station.place)}
@@ -131,6 +131,19 @@ def singular_equation(
                     return f"root {lost!r} of station {station.name!r} has no solution at the prior mean ({at})"
                 return f"component {component!r} of station {station.name!r} has no finite value at the prior mean ({at})"
     return ""
+
+
+def _unlike(stations: Iterable[Station]) -> Iterable[Station]:
+    """Stations without those that have the place, the sensor and the numbers of one before, as blocks of a pass may have."""
+    found: dict[Any, Station] = {}
+    for station in stations:
+        place: Any = station.place
+        try:
+            hash(place)
+        except TypeError:
+            place = id(place)
+        found.setdefault((station.sensor, place, tuple(dict(station.numbers).items())), station)
+    return found.values()
 
 
 def check_own_functions(

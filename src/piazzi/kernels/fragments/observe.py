@@ -9,20 +9,6 @@ Rosenberg, Annals of Economic and Social Measurement 2, 1973, and de Jong, Annal
 from piazzi.kernels.vocabulary import *  # noqa: F403
 
 
-@inline
-def whiten_row(measured, row, t, x, p, own):
-    """Innovation and Jacobian of one row at a state, in units of its noise."""
-    s = measured.station[row]
-    innovate_row(measured, row, t, x, p, own.nu, own.H, 0)
-    if measured.correlated[s]:
-        decorrelate(own.nu, own.H, 0, measured.R, s * M * M, own.work)
-    else:
-        for i in range(M):
-            weight = 1.0 / sqrt(measured.R[(s * M + i) * M + i])
-            own.nu[i] = weight * own.nu[i]
-            store(own.H, i * N, weight * load_vector(own.H, i * N, N))
-
-
 @entry
 def observe(run: Run, p: Given, measured: Measured, follow: int, seen: Observation) -> None:
     own = Row(scratch(M), scratch(MN), scratch(WORK))
@@ -60,11 +46,3 @@ def observe(run: Run, p: Given, measured: Measured, follow: int, seen: Observati
                     W = W - outer(gain, g)
         if follow:
             store(seen.states, k * N, y + d)
-
-
-@entry
-def predict_rows(run: Run, p: Given, measured: Measured, noiseless: Noiseless) -> None:
-    for k in range(run.epochs):
-        x = load_vector(noiseless.states, k * N, N)
-        for row in range(run.first_row[k], run.first_row[k + 1]):
-            measure_row(measured, row, run.t[k], x, p, noiseless.z, row * M)
