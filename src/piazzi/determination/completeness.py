@@ -88,7 +88,7 @@ def _others(given: Setup, states: Array, analysis: Analysis) -> Iterator[tuple[s
     if not t[-1] > t[0]:
         return
     path, Phi = follow(given.problem, t, states[0], given.chosen.max_step)
-    back = np.linalg.solve(products(Phi)[:, :6, :6], np.eye(6)[:, 3:])  # of the first state, by a change of velocity at each time
+    back = np.linalg.solve(products(Phi)[:, :6, :6], np.eye(6)[:, 3:])  # of the first state, by a change of velocity then
     for name, pull in _pulls(given, t, path):
         rate = (back @ pull[:, :, None])[..., 0]
         total = np.vstack([np.zeros(6), np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)[:, None], axis=0)])

@@ -1,4 +1,4 @@
-"""An orbit with its derivatives by its first state, at many epochs: steps as long as the orbit allows, and between them a polynomial.
+"""An orbit with its derivatives by its first state: in steps as long as it allows, and between them by a polynomial.
 
 Within a pass epochs are seconds apart, where a step of order 8 may take half a minute: one step for each would cost more than
 the orbit.  Between the ends of steps positions, and their derivatives by the first state, are those of the polynomial of

@@ -186,7 +186,7 @@ def _coordinates(row: Mapping[str, Any], where: str) -> tuple[float, float, floa
 
 def _ask(place: Station, swapped: Station | None, height: object, where: str) -> None:
     """Questions about numbers that are possible and unlikely."""
-    known = ilrs_stations().get(place.name)
+    known = ilrs_stations().get(place.name) if place.name[:1].isdigit() else None  # as all names of these sites begin
     if known is not None:
         here, there = known.position(J2000), place.position(J2000)
         away = float(np.linalg.norm(here - there))
