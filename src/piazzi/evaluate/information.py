@@ -102,9 +102,7 @@ def whitened(problem: Problem, inputs: Inputs, states: Array) -> tuple[Array, Ar
     """Whitened innovations (J, m) at states (K, n), NaN where missing, and minus their derivatives (J, m, n) by these."""
     N, (J, M) = problem.model.n, inputs.z.shape
     run, p, measured, _ = inputs.bundles(problem)
-    seen = Observation(
-        states=np.ascontiguousarray(states, dtype=float), innovations=np.empty((J, M)), rows=np.empty((J, M, N))
-    )
+    seen = Observation(states=np.ascontiguousarray(states, dtype=float), innovations=np.empty((J, M)), rows=np.empty((J, M, N)))
     _of_rows(problem).whiten_rows(run, p, measured, seen)
     return seen.innovations, seen.rows
 
