@@ -73,8 +73,7 @@ def _gravity(given: Setup, states: Array) -> Iterator[tuple[str, Array]]:
     inputs, times, step = prepare(given.problem, given.tracking), given.tracking.times, given.chosen.max_step
     with np.errstate(all="ignore"):  # whitened; by the same sensors: the field is the orbit's
         here, there = (
-            whitened(given.problem, inputs, swept(problem, times, states[0], step)[0])[0]
-            for problem in (given.problem, larger)
+            whitened(given.problem, inputs, swept(problem, times, states[0], step)[0])[0] for problem in (given.problem, larger)
         )
     yield f"gravity to degree {more} instead of {f'degree {degree}' if degree > 1 else 'the Earth as a point'}", here - there
 
