@@ -167,6 +167,8 @@ update_deviation: Any
 squared_innovation: Any
 update_epoch_guarded: Any
 passes_gate: Any
+# written in fragments/rows.py
+whiten_row: Any
 # written in fragments/graph_linearize.py
 weigh_dynamics: Any
 # written in fragments/*_lanes.py
