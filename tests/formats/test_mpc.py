@@ -117,6 +117,7 @@ def test_radar_whose_frequency_is_whole_megahertz(tmp_path):
     table = pz.read_tracking(mpc(tmp_path, first, second))
     np.testing.assert_allclose(table.value, [42.18031212, -12351.47], rtol=1e-12)
     np.testing.assert_allclose(table.sigma, [0.65e-6, 0.52])
+    assert abs(table.instant(0) - pz.Epoch("1992-12-02T21:40:00 UTC")) < 1e-9  # not 21:40:00.0192, as the digits say
     assert np.isnan(table.extra["magnitude"]).all() and set(table.extra["catalogue"]) == {""}
     assert dict(table.segments[0].frequencies)["transmit"] == 8510e6 and table.segments[0].path == ("253", "(433)", "252")
 

@@ -218,6 +218,24 @@ def test_julian_days_of_many_rows(tmp_path):
     np.testing.assert_allclose(days - days[0], np.arange(40_000) / 4096, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "name, first, instant",
+    [
+        ("time[unix]", "1502628669.25", "2017-08-13T12:51:09.25 UTC"),  # 17391 days of 86400 s and 46269.25 s
+        ("time[s past 2017-08-13T12:51:00 UTC]", "9.25", "2017-08-13T12:51:09.25 UTC"),
+    ],
+)
+def test_seconds_past_a_date(tmp_path, name, first, instant):
+    path = tmp_path / "a.csv"
+    path.write_text(f"when,x[km],y[km],z[km]\n{first},7000,0,0\n")
+    table = pz.read_tracking(path, columns=f"time=when{name.removeprefix('time')}", frame="ITRF")
+    assert abs(table.instant(0) - pz.Epoch(instant)) < 1e-6
+    with pytest.raises(ValueError, match="seconds past 1970 are Unix time to most"):
+        pz.read_tracking(path, columns="time=when[s past 1970-01-01T00:00:00 UTC]")
+    with pytest.raises(ValueError, match=r"the times are numbers, .* time=T\[unix\]"):
+        pz.read_tracking(path, columns="time=when")
+
+
 def test_times_in_a_unit_that_is_no_scale(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("time[day],station,range[m]\n58130.5,A,10\n")

@@ -21,6 +21,7 @@ EXTRA = ("magnitude", "band", "catalogue", "note", "technique", "reference", "pl
 AU = 149597870700.0  # m
 _ARCSECOND = math.pi / 648000.0
 _SECOND = {"s": "S", "v": "V", "r": "R"}  # second lines, and the first line that each belongs to
+_STEP = 0.0433  # s: half of the last digit of a time
 _UTC = 36934  # 1960-01-01
 _TEXT = "lines of text between observations"
 _DATE = re.compile(r"\d{4} [ \d]\d [ \d]\d\.\d")
@@ -178,8 +179,15 @@ def _fixed(text: str, what: str) -> float:
     return number(f"{whole or '0'}.{part.replace(' ', '0')}", what)
 
 
+def _second(text: str) -> tuple[int, float]:
+    """Day and whole second of a radar, which six decimals of a day hold to 0.043 s, while delays change by 1e-4 of it."""
+    day, seconds = _date(text)
+    near = round(seconds)
+    return (day, float(near)) if abs(seconds - near) <= _STEP and near < 86400 else (day, seconds)
+
+
 def _radar(rows: Rows, first: str, second: str, line: int) -> None:
-    day, seconds = _date(first)
+    day, seconds = _second(first)
     sender, receiver, target = first[68:71].strip(), first[77:80].strip(), unpack(first[:12])
     megahertz = _megahertz(first[62:68], second[62:68])
     point = {"S": "surface", "C": "centre of mass"}.get(second[32])

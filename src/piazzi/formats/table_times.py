@@ -9,12 +9,16 @@ import numpy as np
 
 from piazzi.earth import Epoch
 from piazzi.earth.columns import Instants, read_dates, read_weeks
+from piazzi.earth.epoch import orientation
+from piazzi.earth.scales import DAY, to_tt
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.observations import Array
-from piazzi.tables.cells import TIME, Cells
-from piazzi.tables.names import SECONDS, WEEK
+from piazzi.tables.cells import PAST, TIME, Cells
+from piazzi.tables.names import SECONDS, WEEK, parts
 
 EPOCH = "epoch"
+UNIX = f"{TIME}[unix]"
+ZERO_UNIX = 40587.0  # MJD of 1970-01-01
 
 
 class Times(NamedTuple):
@@ -35,12 +39,17 @@ def clocks(cells: Cells, told: Conventions) -> Times:
     place = _places(cells)
     if cells.dates is not None:
         return _dates(cells, told)
-    if TIME not in cells.numbers and WEEK not in cells.numbers:
-        name = next(name for name in cells.numbers if name.startswith(TIME))
-        raise ValueError(f"column {name[:60]!r} is no time: it is in a scale, as time[UTC], time[MJD UTC] or time[s past DATE]")
-    if TIME not in cells.numbers:
+    if {WEEK, SECONDS} <= cells.numbers.keys() and TIME not in cells.numbers:
         return _past(read_weeks(cells.numbers[WEEK], cells.numbers[SECONDS], place))
-    return _seconds(cells, place)
+    name = next(name for name in cells.numbers if parts(name)[0] == TIME)
+    if name.casefold() == UNIX:
+        return _past(_unix(cells.numbers[name], place))
+    found = PAST.fullmatch(name)
+    if name != TIME and found is None:
+        raise ValueError(
+            f"column {name[:60]!r} is no time: it is in a scale, as time[UTC], time[MJD UTC], {UNIX} or time[s past DATE]"
+        )
+    return _seconds(cells.numbers[name], found[1] if found else _said(cells), place)
 
 
 def _places(cells: Cells, rows: Array | None = None) -> Callable[[int], str]:
@@ -77,17 +86,39 @@ def _dates(cells: Cells, told: Conventions) -> Times:
     return found._replace(scales=tuple(known), scale=which)
 
 
-def _seconds(cells: Cells, place: Callable[[int], str]) -> Times:
-    """Numbers as seconds past the epoch that a line above the header says."""
+def _said(cells: Cells) -> str:
+    """The date that numbers are seconds past, by a line above the header."""
     pairs = (comment.partition("=") for comment in cells.comments)
     said = next((value.strip() for key, equals, value in pairs if equals and key.strip() == EPOCH), "")
     if not said:
         raise ValueError(
-            "the times are numbers, and no line above the header says past which date, as # epoch = 2016-02-13T16:00:00 UTC; "
-            'days are time[MJD UTC] or time[JD TDB], as in --columns "time=T[MJD UTC]"'
+            "the times are numbers, and nothing says past which date, as # epoch = 2016-02-13T16:00:00 UTC above the header, "
+            'or --columns "time=T[s past 2016-02-13T16:00:00 UTC]"; others are time=T[unix], time=T[MJD UTC], time=T[JD TDB]'
         )
-    epoch, t = Epoch(said), cells.numbers[TIME]
+    return said
+
+
+def _seconds(t: Array, said: str, place: Callable[[int], str]) -> Times:
+    """Numbers as seconds past a date."""
+    _finite(t, place)
+    epoch = Epoch(said)
+    if epoch == Epoch("1970-01-01T00:00:00 UTC"):
+        raise ValueError(
+            f"seconds past 1970 are Unix time to most, which has no leap seconds: name the column {UNIX}, or another date"
+        )
+    return Times(epoch, t, ("TT",), np.zeros(len(t), dtype=np.int64))
+
+
+def _unix(t: Array, place: Callable[[int], str]) -> Instants:
+    """Seconds past 1970 in days of 86400 s each, leap seconds left out, as instants of UTC."""
+    _finite(t, place)
+    day = np.floor(t / DAY)
+    seconds = t - DAY * day
+    whole = np.floor(seconds)
+    return Instants("UTC", *to_tt("UTC", day + ZERO_UNIX, whole, seconds - whole, orientation("UTC")))
+
+
+def _finite(t: Array, place: Callable[[int], str]) -> None:
     bad = np.flatnonzero(~np.isfinite(t))
     if bad.size:
         raise ValueError(f"{place(int(bad[0]))}the time {'is missing' if np.isnan(t[bad[0]]) else 'is infinite'}")
-    return Times(epoch, t, ("TT",), np.zeros(len(t), dtype=np.int64))

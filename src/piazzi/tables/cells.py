@@ -26,7 +26,7 @@ _ODD = (b'"', b"\r", b"\0")
 _WORDS = (b"rue", b"RUE", b"alse", b"ALSE")  # true and false are numbers to pandas, but not to us
 PIECE = 2**18  # bytes that are looked at together: what stays in a cache
 LONGEST_DATE = 60
-_PAST = re.compile(r"time ?\[s past ([^\[\]]+)\]")
+PAST = re.compile(r"time ?\[s past ([^\[\]]+)\]")
 _DATE = re.compile(r"\s*(\d{4}[-/]\d|M?JD\s*\d)")
 SMALL = 2**19  # bytes for which the careful way takes less time than importing pandas
 
@@ -387,7 +387,7 @@ def _name(cell: str, column: str, line: int) -> str:
 
 def since(header: list[str]) -> tuple[list[str], list[str]]:
     """The header with ``time`` for ``time[s past DATE]``, and what a comment above the table would say of it."""
-    since = [(i, match[1]) for i, name in enumerate(header) if (match := _PAST.fullmatch(name))]
+    since = [(i, match[1]) for i, name in enumerate(header) if (match := PAST.fullmatch(name))]
     return [TIME if i in dict(since) else name for i, name in enumerate(header)], [f"epoch = {date}" for _, date in since]
 
 
