@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -110,7 +111,7 @@ def measured(
     Parameters
     ----------
     observations : of one object
-    stations : see `sites.sites_of`; default those of the ILRS for lasers
+    stations : see `sites.sites_of`; default those of the ILRS for lasers, of the Minor Planet Center for its formats
     com : what ranges are shorter by than to the centre of mass, m; default by the object's name
     corrections : "applied" or "open", whether media are corrected for already where the files do not say it
     clocks : whether sensors have a number that times are late by
@@ -128,6 +129,9 @@ def measured(
     sites = sites_of(stations)
     if sites is None and any(segment.wavelength is not None for segment in observations.segments):
         sites = sites_of("ilrs")
+    if sites is None and "place_axes" in observations.extra:  # of the Minor Planet Center, whose list may not be installed
+        with suppress(ValueError):
+            sites = sites_of("mpc")
     everything = replace(observations, sigma=with_station_sigmas(observations, sites))
     _ask(everything)
     everything, added = with_corrections(everything, sites)
