@@ -14,7 +14,7 @@ from piazzi.determination.passing import Instant, Passage, passages, span_of
 from piazzi.earth import Epoch, Station
 from piazzi.earth.constants import ASTRONOMICAL_UNIT
 from piazzi.earth.stepping import longest_step
-from piazzi.evaluate.grids import Grid, as_html, as_rich
+from piazzi.evaluate.grids import Grid, Tabled, as_html
 from piazzi.evaluate.quantities import finite, number
 from piazzi.problem.checks import Array
 from piazzi.text import brief, printable
@@ -40,7 +40,7 @@ UNITS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Sky:
+class Sky(Tabled):
     """What a station sees of an orbit.
 
     Attributes
@@ -139,25 +139,22 @@ class Sky:
 
         write(self, path)
 
+    def grids(self) -> list[Grid]:
+        """One table: of passes, or of rows."""
+        return [_passes_grid(self) if self.passes is not None else _rows_grid(self)]
+
+    def sentences(self) -> list[str]:
+        """What was assumed."""
+        return [f"Assumed: {printable(text)}." for text in self.course.assumed]
+
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterable[Any]:
         from rich.text import Text
 
         yield Text(printable(self.heading))
-        yield from as_rich([self._grid()], [f"Assumed: {printable(text)}." for text in self.course.assumed], console, options)
-
-    def __str__(self) -> str:
-        from piazzi.evaluate.grids import as_text
-
-        return as_text(self)
+        yield from super().__rich_console__(console, options)
 
     def _repr_html_(self) -> str:
-        return as_html([self._grid()], [self.heading])
-
-    def to_latex(self) -> str:
-        """Its table as LaTeX (booktabs)."""
-        from piazzi.evaluate.latex import as_latex
-
-        return as_latex([self._grid()])
+        return as_html(self.grids(), [self.heading, *self.sentences()])
 
     @property
     def heading(self) -> str:
@@ -167,9 +164,6 @@ class Sky:
             f"{self.course.name or 'the object'} from {self.station.name}: {self.angles} right ascension and declination{on}; "
             f"azimuth and elevation without refraction; {self.span[0]} to {self.span[1]}"
         )
-
-    def _grid(self) -> Grid:
-        return _passes_grid(self) if self.passes is not None else _rows_grid(self)
 
 
 def ephemeris(

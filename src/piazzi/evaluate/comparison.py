@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,9 +15,9 @@ from piazzi.estimate.ahead import compile_for
 from piazzi.estimate.estimator import Estimate, Estimator, views_of
 from piazzi.estimate.registry import by_name
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
-from piazzi.evaluate.comparison_table import grid, html, render
+from piazzi.evaluate.comparison_table import grid, html, render, sentences
 from piazzi.evaluate.consistency_tests import LONGEST
-from piazzi.evaluate.grids import as_text
+from piazzi.evaluate.grids import Grid, Tabled
 from piazzi.evaluate.metrics import apart
 from piazzi.evaluate.rows import Row, evaluate, numbers
 from piazzi.problem import Problem, Tracking
@@ -35,7 +34,7 @@ SCHEMA = "piazzi.compare/1"
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(Drawn):
+class Comparison(Tabled, Drawn):
     """Rows side by side, and the estimates that they are about.
 
     Attributes
@@ -81,10 +80,6 @@ class Comparison(Drawn):
             "rows": [row.to_dict() for row in self.rows],
         }
 
-    def to_json(self, indent: int | None = None) -> str:
-        """The object of schema piazzi.compare/1 as strict JSON."""
-        return json.dumps(self.to_dict(), allow_nan=False, indent=indent)
-
     def to_dataset(self) -> xarray.Dataset:
         """Every number of the rows, labelled by estimator and view, with units."""
         import xarray as xr
@@ -106,14 +101,13 @@ class Comparison(Drawn):
         failed = [name for name, e in self.estimates.items() if not e.success]
         return f"<Comparison of {listed(self.estimates)} on {self.problem!r}{f'; failed: {listed(failed)}' if failed else ''}>"
 
-    def to_latex(self) -> str:
-        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
-        from piazzi.evaluate.latex import as_latex
+    def grids(self) -> list[Grid]:
+        """One table, every column of it."""
+        return [grid(self.problem.model, self.rows, self.tracking.values)]
 
-        return as_latex([grid(self.problem.model, self.rows, self.tracking.values)])
-
-    def __str__(self) -> str:
-        return as_text(self)
+    def sentences(self) -> list[str]:
+        """What the table says, in plain words."""
+        return sentences(self.problem.model, self.rows, self.tracking.values)
 
 
 def compare(

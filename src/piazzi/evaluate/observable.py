@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from piazzi.drawn import Drawn
 from piazzi.evaluate.attempts import Attempt
-from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
+from piazzi.evaluate.grids import Grid, Tabled
 from piazzi.evaluate.information import Information
 from piazzi.evaluate.quantities import displays, finite, number
 from piazzi.evaluate.twins import NO_SEARCH, Search, Twin
@@ -23,14 +22,13 @@ from piazzi.text import printable
 
 if TYPE_CHECKING:
     import xarray
-    from rich.console import Console, ConsoleOptions, RenderResult
 
 SCHEMA = "piazzi.observability/1"
 _LISTED = 8  # twins in the table
 
 
 @dataclass(frozen=True, eq=False)
-class Observability(Drawn):
+class Observability(Tabled, Drawn):
     """What the measurements of a tracking say about the first state, without the prior.
 
     Attributes
@@ -139,10 +137,6 @@ class Observability(Drawn):
             "added": None if self.added is None else self.added.to_dict(),
         }
 
-    def to_json(self, indent: int | None = None) -> str:
-        """The object of schema piazzi.observability/1 as strict JSON."""
-        return json.dumps(self.to_dict(), allow_nan=False, indent=indent)
-
     def to_dataset(self) -> xarray.Dataset:
         """Singular values, directions, bounds and their growth with names and units."""
         import xarray as xr
@@ -179,24 +173,9 @@ class Observability(Drawn):
             out += [line for line in _split(self.added.verdict) if line.startswith(("Observability", "Twin"))]
         return out
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        return as_rich(self.grids(), self.sentences(), console, options)
-
-    def _repr_html_(self) -> str:
-        return as_html(self.grids(), self.sentences())
-
     def __repr__(self) -> str:
         """In short: the verdict's first sentence, on what."""
         return f"<{_split(self.verdict)[0].removesuffix('.')}; {self.problem!r}>"
-
-    def to_latex(self) -> str:
-        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
-        from piazzi.evaluate.latex import as_latex
-
-        return as_latex(self.grids())
-
-    def __str__(self) -> str:
-        return as_text(self)
 
 
 def _split(text: str) -> list[str]:

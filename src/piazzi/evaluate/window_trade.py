@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from piazzi.drawn import Drawn
 from piazzi.evaluate.comparison_table import PASSED, row_display
-from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
+from piazzi.evaluate.grids import Grid, Tabled
 from piazzi.evaluate.judgement import failing, tested
 from piazzi.evaluate.quantities import duration, ends, finite, ideal, number
 from piazzi.evaluate.rows import Row, numbers
@@ -21,7 +20,6 @@ from piazzi.text import listed
 
 if TYPE_CHECKING:
     import xarray
-    from rich.console import Console, ConsoleOptions, RenderResult
 
 SCHEMA = "piazzi.windows/1"
 _SAME = 1.0001  # times the best error that is no difference
@@ -50,7 +48,7 @@ class Timing:
 
 
 @dataclass(frozen=True, eq=False)
-class WindowTrade(Drawn):
+class WindowTrade(Tabled, Drawn):
     """Sliding windows of several lengths on the same measurements, beside the full graph.
 
     Attributes
@@ -142,10 +140,6 @@ class WindowTrade(Drawn):
             for row in pair
         ]
 
-    def to_json(self, indent: int | None = None) -> str:
-        """The object of schema piazzi.windows/1 as strict JSON."""
-        return json.dumps(self.to_dict(), allow_nan=False, indent=indent)
-
     def to_dataset(self) -> xarray.Dataset:
         """Errors, consistency and cost against lag and view, with units."""
         import xarray as xr
@@ -194,24 +188,9 @@ class WindowTrade(Drawn):
                 out.append(f"{name}, the smallest {group} error of the last half is {smallest}; {enough}.")
         return out
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        return as_rich(self.grids(), self.sentences(), console, options)
-
-    def _repr_html_(self) -> str:
-        return as_html(self.grids(), self.sentences())
-
     def __repr__(self) -> str:
         """In short: which lengths, on what."""
         return f"<WindowTrade: lags {listed(str(int(lag)) for lag in self.lags)} on {self.problem!r}>"
-
-    def to_latex(self) -> str:
-        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
-        from piazzi.evaluate.latex import as_latex
-
-        return as_latex(self.grids())
-
-    def __str__(self) -> str:
-        return as_text(self)
 
 
 def _enough(lags: Array, errors: Array, best: float) -> str:

@@ -4,40 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
+from piazzi.evaluate.grids import Grid, Tabled
 from piazzi.evaluate.quantities import display_of, number
 from piazzi.text import printable
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rich.console import Console, ConsoleOptions
-
 
 @dataclass(frozen=True)
-class Differing:
-    """What `Difference.to_dict` says, which rich and notebooks can show."""
+class Differing(Tabled):
+    """What `Difference.to_dict` says, with its table."""
 
     found: Mapping[str, Any]
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterable[Any]:
-        return as_rich([self.grid()], list(self.sentences()), console, options)
+    def to_dict(self) -> dict[str, Any]:
+        return dict(self.found)
 
-    def _repr_html_(self) -> str:
-        return as_html([self.grid()], list(self.sentences()))
-
-    def to_latex(self) -> str:
-        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
-        from piazzi.evaluate.latex import as_latex
-
-        return as_latex([self.grid()])
-
-    def __str__(self) -> str:
-        return as_text(self)
-
-    def grid(self) -> Grid:
+    def grids(self) -> list[Grid]:
         """One line for each axis, and for the distance."""
         found = self.found
         a, b = (orbit["name"] for orbit in found["orbits"])
@@ -55,7 +38,7 @@ class Differing:
         heads += ("rms\n[sigma]", "largest\n[sigma]") if sigma is not None else ()
         kind = "along the axes of the first" if found["axes"] in ("RTN", "TNW") else f"in {found['axes']}"
         title = f"{b} minus {a}, {kind}: {found['count']:,} times, {found['first']} to {found['last']}"
-        return Grid(title, heads, tuple(rows))
+        return [Grid(title, heads, tuple(rows))]
 
     def sentences(self) -> Iterator[str]:
         """Covariances, and how states between rows were made."""

@@ -5,15 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from piazzi.evaluate.grids import Grid, as_html, as_rich, as_text
+from piazzi.evaluate.grids import Grid, Tabled
 from piazzi.evaluate.quantities import NOTHING, display_of, duration, number
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rich.console import Console, ConsoleOptions
 
 MOST_PASSES, MOST_STATIONS = 12, 30
 MOST_STATED = 6
@@ -23,25 +18,13 @@ _EVENTS = {"transmit": "transmission", "receive": "reception", "bounce": "the bo
 
 
 @dataclass(frozen=True)
-class Tracked:
-    """The summary of `formats.summary`, which rich and notebooks can show."""
+class Tracked(Tabled):
+    """The summary of `formats.summary`, with its tables."""
 
     found: Mapping[str, Any]
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterable[Any]:
-        return as_rich(self.grids(), list(self.sentences()), console, options)
-
-    def _repr_html_(self) -> str:
-        return as_html(self.grids(), list(self.sentences()))
-
-    def to_latex(self) -> str:
-        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
-        from piazzi.evaluate.latex import as_latex
-
-        return as_latex(self.grids())
-
-    def __str__(self) -> str:
-        return as_text(self)
+    def to_dict(self) -> dict[str, Any]:
+        return dict(self.found)
 
     def heading(self) -> str:
         """One line: files, rows, span, objects and stations."""
