@@ -175,8 +175,8 @@ def test_two_events_in_one_step_in_their_order():
         assert_allclose(Phi, np.eye(2), rtol=0, atol=1e-12)  # a later start is a later end, at the same speed
 
 
-def test_an_edge_that_is_estimated_has_its_column():
-    """The time of a switch is a constant to estimate: its column of the matrix is the jump."""
+def switched():
+    """A push whose beginning is a constant to estimate."""
     model = pz.Model(
         ["x", "v"],
         {"x": "v", "v": "(1 + sign(on))/2"},
@@ -185,7 +185,7 @@ def test_an_edge_that_is_estimated_has_its_column():
         definitions={"on": "t - start"},
         events={"burn": "on"},
     )
-    problem = pz.Problem(
+    return pz.Problem(
         model,
         pz.Gaussian([0.0, 0.0], [1e-6, 1e-6]),
         [0.0, 0.0],
@@ -193,8 +193,17 @@ def test_an_edge_that_is_estimated_has_its_column():
         parameters={"start": pz.Gaussian([1.2], [0.1])},
         integrator=pz.RungeKutta4(2),
     )
-    _, Phi = problem.step([0.0, 0.0, 1.2], 3.0)
+
+
+def test_an_edge_that_is_estimated_has_its_column():
+    """The column of the matrix is the jump."""
+    _, Phi = switched().step([0.0, 0.0, 1.2], 3.0)
     assert_allclose(Phi[:, 2], [-1.8, -1.0, 1.0], rtol=0, atol=1e-12)  # x = (3 - start)^2 / 2
+
+
+@pytest.mark.slow  # kernels of nine seconds
+def test_the_time_of_a_switch_is_found():
+    problem = switched()
     times = np.linspace(0.0, 4.0, 41)
     truth = np.where(times > 1.5, (times - 1.5) ** 2 / 2, 0.0)
     found = pz.FactorGraph().estimate(problem, pz.Tracking(times, truth[:, None], ["ruler"] * 41))
@@ -338,13 +347,21 @@ def test_sigma_points_go_through_the_event_one_by_one():
     assert np.isfinite(estimate.mean).all()
 
 
-def test_live_is_the_whole_run_bit_for_bit(seen):
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        pz.ExtendedKalmanFilter(),
+        pytest.param(pz.UnscentedKalmanFilter(), marks=pytest.mark.slow),
+        pytest.param(pz.SlidingWindow(lag=5), marks=pytest.mark.slow),
+    ],
+    ids=lambda e: type(e).__name__,
+)
+def test_live_is_the_whole_run_bit_for_bit(seen, estimator):
     problem, tracking = seen
-    for estimator in (pz.ExtendedKalmanFilter(), pz.UnscentedKalmanFilter(), pz.SlidingWindow(lag=5)):
-        whole, live = estimator.estimate(problem, tracking), estimator.start(problem)
-        for k, t in enumerate(tracking.times):
-            live.update("ruler", tracking.values[k, 0], t)
-            assert_array_equal(live.mean, whole.mean[k])
+    whole, live = estimator.estimate(problem, tracking), estimator.start(problem)
+    for k, t in enumerate(tracking.times):
+        live.update("ruler", tracking.values[k, 0], t)
+        assert_array_equal(live.mean, whole.mean[k])
 
 
 def test_batch_finds_the_first_state():
