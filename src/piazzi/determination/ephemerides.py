@@ -14,8 +14,9 @@ from piazzi.determination.passing import Instant, Passage, passages, span_of
 from piazzi.earth import Epoch, Station
 from piazzi.earth.constants import ASTRONOMICAL_UNIT
 from piazzi.earth.stepping import longest_step
-from piazzi.evaluate.grids import Grid, Tabled, as_html
+from piazzi.evaluate.grids import Grid, as_html
 from piazzi.evaluate.quantities import finite, number
+from piazzi.evaluate.tabled import Tabled
 from piazzi.problem.checks import Array
 from piazzi.text import brief, printable
 from piazzi.units import positive_duration

@@ -17,9 +17,10 @@ from piazzi.estimate.registry import by_name
 from piazzi.evaluate.bounds import Bounds, posterior_bounds
 from piazzi.evaluate.comparison_table import grid, html, render, sentences
 from piazzi.evaluate.consistency_tests import LONGEST
-from piazzi.evaluate.grids import Grid, Tabled
+from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.metrics import apart
 from piazzi.evaluate.rows import Row, evaluate, numbers
+from piazzi.evaluate.tabled import Tabled
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.epochs import dated
 from piazzi.problem.inputs import prepare

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -40,41 +39,6 @@ class Grid:
         rows = tuple(tuple(row[i] for i in kept) for row in self.rows)
         left = sum(i < self.left for i in kept)
         return Grid(self.title, tuple(self.heads[i] for i in kept), rows, left)
-
-
-class Tabled:
-    """A result that is tables and sentences, the same in a terminal, a notebook, LaTeX and text."""
-
-    def grids(self) -> list[Grid]:
-        """The tables."""
-        raise NotImplementedError
-
-    def sentences(self) -> Iterable[str]:
-        """What is said below them."""
-        raise NotImplementedError
-
-    def to_dict(self) -> dict[str, Any]:
-        """All of it, as plain values."""
-        raise NotImplementedError
-
-    def to_json(self, indent: int | None = None) -> str:
-        """What `to_dict` says as strict JSON, an object of the schema that it names."""
-        return json.dumps(self.to_dict(), allow_nan=False, indent=indent)
-
-    def to_latex(self) -> str:
-        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
-        from piazzi.evaluate.latex import as_latex
-
-        return as_latex(self.grids())
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterable[Any]:
-        yield from as_rich(self.grids(), self.sentences(), console, options)
-
-    def _repr_html_(self) -> str:
-        return as_html(self.grids(), self.sentences())
-
-    def __str__(self) -> str:
-        return as_text(self)
 
 
 def as_rich(grids: Sequence[Grid], sentences: Iterable[str], console: Console, options: ConsoleOptions) -> Iterable[Any]:

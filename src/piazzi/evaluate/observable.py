@@ -10,9 +10,10 @@ import numpy as np
 
 from piazzi.drawn import Drawn
 from piazzi.evaluate.attempts import Attempt
-from piazzi.evaluate.grids import Grid, Tabled
+from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.information import Information
 from piazzi.evaluate.quantities import displays, finite, number
+from piazzi.evaluate.tabled import Tabled
 from piazzi.evaluate.twins import NO_SEARCH, Search, Twin
 from piazzi.evaluate.verdict import AS_THE_PRIOR, conclusion, local, twins_found, unreliable, weakest
 from piazzi.problem import Problem, Tracking

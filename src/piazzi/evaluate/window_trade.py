@@ -9,10 +9,11 @@ import numpy as np
 
 from piazzi.drawn import Drawn
 from piazzi.evaluate.comparison_table import PASSED, row_display
-from piazzi.evaluate.grids import Grid, Tabled
+from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.judgement import failing, tested
 from piazzi.evaluate.quantities import duration, ends, finite, ideal, number
 from piazzi.evaluate.rows import Row, numbers
+from piazzi.evaluate.tabled import Tabled
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.epochs import dated

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from piazzi.evaluate.grids import Grid, Tabled
+from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.quantities import display_of, number
+from piazzi.evaluate.tabled import Tabled
 from piazzi.text import printable
 
 

@@ -7,8 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from piazzi.evaluate.grids import Grid, Tabled
+from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.quantities import NOTHING, display_of, duration, number
+from piazzi.evaluate.tabled import Tabled
 
 MOST_PASSES, MOST_STATIONS = 12, 30
 MOST_STATED = 6
