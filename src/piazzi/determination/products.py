@@ -27,7 +27,7 @@ from piazzi.io import hdf5
 from piazzi.io.atomic import atomic_path
 from piazzi.io.scenario_text import scenario_text
 from piazzi.orbit import fit_sgp4
-from piazzi.problem import Problem
+from piazzi.problem import Problem, Schedule, Tracking
 from piazzi.text import escape_formula, printable
 
 ENDINGS = (".oem", ".opm", ".ocm", ".omm", ".tle", ".nc", ".csv", ".json", ".toml")
@@ -98,11 +98,25 @@ def _elements(found: Any, span: Any, step: float | None) -> MeanElements:
 
 def problem_text(found: Any) -> str:
     """The whole problem with the times of its measurements, as a scenario that every command loads; and its case."""
+    problem = scheduled(found.problem, found.tracking)
     with suppress(ValueError):  # a case of objects that are known in Python only
         own = replace(found.case, output=(), report=None)  # who runs the file again asks for what is to be written
         tables_ = case_tables(own, found.setup, Path.cwd())
-        return scenario_text(found.problem, found.tracking.times, tuple(found.estimates), tables_)
-    return scenario_text(found.problem, found.tracking.times, tuple(found.estimates))
+        return scenario_text(problem, found.tracking.times, tuple(found.estimates), tables_)
+    return scenario_text(problem, found.tracking.times, tuple(found.estimates))
+
+
+def scheduled(problem: Problem, tracking: Tracking) -> Problem:
+    """The problem whose stations measure from their first row to their last one, where they did not at all times."""
+    if tracking.row_stations is None:
+        return problem
+    measured = np.isfinite(tracking.values).any(axis=1)
+    stations = []
+    for station in problem.stations:
+        own = tracking.row_times[measured & (tracking.row_stations == station.name)]
+        part = 0 < len(own) < len(tracking.times)
+        stations.append(replace(station, schedule=Schedule(start=own[0], until=own[-1])) if part else station)
+    return replace(problem, stations=stations)
 
 
 def block(found: Any) -> dict[str, object]:
