@@ -30,5 +30,5 @@ def test_a_station_that_measured_at_all_times_has_no_schedule():
     problem = load_scenario("b612-range").problem
     t = np.array([0.0, 1.0, 2.0])
     tracking = pz.Tracking(t, np.ones((3, 1)), np.array([problem.stations[0].name] * 3))
-    assert scheduled(problem, tracking).stations == problem.stations
+    assert [s.schedule for s in scheduled(problem, tracking).stations] == [s.schedule for s in problem.stations] == [None]
     assert scheduled(problem, pz.Tracking(t, np.ones((3, 1)))) is problem
