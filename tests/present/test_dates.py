@@ -2,6 +2,7 @@
 
 from datetime import datetime
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,9 +10,12 @@ import pytest
 from piazzi.earth import Epoch
 from piazzi.evaluate.quantities import Display
 from piazzi.present.dates import Calendar
+from piazzi.present.figures.difference import difference_page
 from piazzi.present.figures.style import time_axis
+from piazzi.present.figures.tracked import schedule
 from piazzi.present.report import write_page
 from piazzi.present.report.blocks import Axis, Chart, Code, Line, Section, Tab
+from tests.determination.fixing import observations
 
 SPANS = [0.02, 1.0, 20.0, 90.0, 600.0, 7200.0, 86400.0, 3e5, 1e6, 3.6e6, 5.9e6, 3e7, 9e7]
 BEGINS = ["2026-11-03T10:07:31.25 UTC", "2016-12-31T23:59:40 UTC", "1801-01-01T20:43:17.8 TT"]
@@ -83,3 +87,28 @@ def test_code_keeps_its_lines(open_page, tmp_path):
     tab = Tab("Code", "", [], [Section("Made", [Code(words)])])
     page = open_page(write_page(tmp_path / "p.html", "Code", [tab]))
     assert page.locator("pre").inner_text().splitlines() == words.replace("\x1b", "\\x1b").splitlines()
+
+
+def test_pictures_of_tracking_and_differences_have_dates():
+    from matplotlib.figure import Figure
+
+    t = np.arange(0.0, 7200.0, 600.0)
+    rows = observations(np.ones((len(t), 3)), t, 1.0)
+    ax = schedule(Figure().add_subplot(), rows)
+    assert ax.get_xlabel() == f"time [{rows.segments[0].scale}]"
+    epoch, three = Epoch("2026-11-03T10:00:00 UTC"), np.ones((len(t), 3))
+    found = SimpleNamespace(epoch=epoch, t=t, position=three, sigma=three, letters="RTN", names=("a", "b"))
+    figure = difference_page(found)
+    assert [ax.get_xlabel() for ax in figure.axes] == ["", "", "time [UTC]"]
+    assert figure.axes[2].get_xticklabels()[0].get_text() == "10:00\n2026-11-03"
+    assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["3 sigma"]
+
+
+def test_an_axis_has_two_marks_however_narrow(open_page, tmp_path):
+    ends = np.array([0.0, 1.0])
+    chart = Chart("c", Axis("x", Display("m")), Axis("y", Display("m")), [Line(ends, ends, "probe")], time=False)
+    page = open_page(write_page(tmp_path / "p.html", "Narrow", [Tab("Narrow", "", [], [Section("s", [chart])])]))
+    for low, high in ((-47000.0, 49000.0), (-1.0, 1.0), (0.3, 7.0), (1e6, 1e6 + 3)):
+        marks = page.evaluate("([low, high]) => ticks(scaleOf({ scale: 'linear' }, low, high, 0, 150), 90)", [low, high])
+        assert len(marks) >= 2 and all(low <= m <= high for m in marks), (low, high, marks)
+    assert page.evaluate("ticks(scaleOf({ scale: 'linear' }, 1, 1, 0, 150), 90)") in ([], [1], [None])

@@ -253,18 +253,21 @@ def _seen(ax: Axes, path: Sampled, lines: Sequence[tuple[Array, Any]], axes: Arr
 
 def ground_track(ax: Axes, path: Sampled, rows: Sequence[Rows]) -> Axes:
     """Where the object was overhead, with stations and where it was when they measured."""
+    from matplotlib.patheffects import withStroke
+
     for ring in np.split(land(), np.flatnonzero(np.isnan(land()[:, 0])) + 1):
         for by in (-360.0, 0.0, 360.0) if len(ring) else ():
             ax.fill(*_closed(ring[:-1], by).T, color=PLANET, lw=0)
     longitude, latitude = _degrees(path.place)
     jumps = np.flatnonzero(np.abs(np.diff(longitude)) > 180.0) + 1
     ax.plot(np.insert(longitude, jumps, np.nan), np.insert(latitude, jumps, np.nan), color=MEASURED, lw=0.5)
+    name: Any = {"fontsize": 6, "path_effects": [withStroke(linewidth=1.5, foreground="white")], "zorder": 5}
     for one in rows:
         ax.plot(*_degrees(one.place), ".", ms=2.0, color=one.colour)
         if one.site is not None:
             x, y = _degrees(one.site[None, :])
             ax.plot(x, y, "^", ms=4, color=one.colour, mec="white", mew=0.4)
-            ax.annotate(plain(one.label), (float(x[0]), float(y[0])), xytext=(3, 2), textcoords="offset points", fontsize=6)
+            ax.annotate(plain(one.label), (float(x[0]), float(y[0])), xytext=(3, 2), textcoords="offset points", **name)
     ax.set_xlim(-180, 180)
     ax.set_ylim(-90, 90)
     ax.set_xticks(range(-180, 181, 60))

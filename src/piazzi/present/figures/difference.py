@@ -9,7 +9,7 @@ import numpy as np
 from piazzi.evaluate.quantities import display_of
 from piazzi.orbit.difference import Difference
 from piazzi.present.colours import STATIONS
-from piazzi.present.figures.style import RC, plain, time_display
+from piazzi.present.figures.style import RC, plain, time_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,14 +18,15 @@ if TYPE_CHECKING:
 
 def difference_track(ax: Axes, found: Difference, axis: int) -> Axes:
     """The difference along one axis, with three sigma of both covariances where there are any."""
-    when = time_display(found.t)
-    hours = (found.t - found.t[0]) * when.factor
+    hours = found.t * time_axis(ax, found.t, found.epoch).factor
     shown = display_of("m", [float(np.abs(found.position).max())])
     three = 3.0 * found.sigma[:, axis] * shown.factor
     if np.isfinite(three).any():
         ax.fill_between(hours, -three, three, color=STATIONS[axis], alpha=0.15, linewidth=0, label="3 sigma")
     ax.plot(hours, found.position[:, axis] * shown.factor, color=STATIONS[axis], marker="." if len(hours) < 400 else "")
     ax.set_ylabel(f"{found.letters[axis]} [{shown.unit}]")
+    if axis == 0 and np.isfinite(three).any():
+        ax.legend(loc="upper right")
     return ax
 
 
@@ -39,8 +40,6 @@ def difference_page(found: Difference, title: str = "") -> Figure:
         figure = Figure(figsize=(9.0, 6.0), layout="constrained")
         tracks = figure.subplots(3, 1, sharex=True)
         for axis in range(3):
-            difference_track(tracks[axis], found, axis)
-        start = (found.epoch + float(found.t[0])).to("UTC", digits=3)
-        tracks[2].set_xlabel(f"Time after {start} [{time_display(found.t).unit}]")
+            difference_track(tracks[axis], found, axis).label_outer()
         figure.suptitle(plain(title or f"{found.names[1]} minus {found.names[0]}"), fontsize=11, x=0.01, ha="left")
     return figure

@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.formats import Observations
 from piazzi.present.colours import STATIONS
-from piazzi.present.figures.style import RC, plain, time_display
+from piazzi.present.figures.style import RC, plain, time_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,8 +23,10 @@ def schedule(ax: Axes, observations: Observations) -> Axes:
     rows = observations[observations.measured] if observations.measured.any() else observations
     pairs = np.stack([np.where(rows.station >= 0, rows.station, rows.object), rows.kind], axis=1)
     lines = np.unique(pairs, axis=0)[:MOST_LINES]
-    shown = time_display(np.array([rows.t.min(), rows.t.max()]) if len(rows) else np.zeros(0))
     start = float(rows.t.min()) if len(rows) else 0.0
+    ends = np.array([0.0, float(rows.t.max()) - start]) if len(rows) else np.zeros(0)
+    begin = (rows.instant(int(np.argmin(rows.t))), rows.segments[0].scale) if len(rows) else (None, "")
+    shown = time_axis(ax, ends, *begin)
     step = max(float(np.ptp(rows.t)) / COLUMNS, 1e-9) if len(rows) else 1.0
     names = []
     for y, (who, kind) in enumerate(lines.tolist()):
@@ -35,8 +37,6 @@ def schedule(ax: Axes, observations: Observations) -> Axes:
         names.append(plain(f"{name}{rows.kinds[kind].replace('_', ' ')}"))
     ax.set_yticks(range(len(names)), names)
     ax.set_ylim(len(names) - 0.5, -0.5)
-    date = rows.instant(int(np.argmin(rows.t))).to(rows.segments[0].scale, digits=3) if len(rows) else ""
-    ax.set_xlabel(f"Time after {date} [{shown.unit}]")
     return ax
 
 

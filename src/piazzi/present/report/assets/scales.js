@@ -19,7 +19,8 @@ function ticks(scale, room) {
   const count = Math.max(2, Math.floor(Math.abs(scale.to - scale.from) / room));
   if (scale.axis.scale === "log" && scale.high > 8 * scale.low) return decades(scale.low, scale.high, count);
   if (scale.axis.scale === "symmetric" && scale.axis.threshold > 0) return bothSides(scale, count);
-  const step = roundStep((scale.high - scale.low) / count); // on a logarithmic scale that is less than a decade too
+  let step = roundStep((scale.high - scale.low) / count); // on a logarithmic scale that is less than a decade too
+  while (Math.floor(scale.high / step) - Math.ceil(scale.low / step) < 1) step = roundStep(step / 2.6); // one mark is no scale; the next smaller
   const out = [];
   for (let i = Math.ceil(scale.low / step - 1e-9); i * step <= scale.high + 1e-9 * step; i++) out.push(i * step);
   return out;
