@@ -2,6 +2,8 @@
 
 import io
 import logging
+import sys
+from types import SimpleNamespace
 
 from rich.console import Console
 
@@ -47,3 +49,28 @@ def test_long_work_takes_it(tmp_path):
         study.run(tmp_path / "s.nc", workers=0, progress=step)
         step._bar.refresh()
     assert "8 of 8" in shown(console)
+
+
+def test_a_notebook_needs_no_widgets(monkeypatch):
+    """Steps are shown by updates of one display, as any notebook has it, and the last leaves it empty."""
+    seen = []
+
+    class Handle:
+        def update(self, data, raw):
+            assert raw
+            seen.append(data["text/plain"])
+
+    def display(data, raw, display_id):
+        assert raw and display_id
+        return Handle()
+
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=display))
+    with pz.progress(Console(force_jupyter=True)) as step:
+        step("ekf")
+        logging.getLogger("piazzi.kernels").info("compiling 3 of 6")
+        for i in range(1, 1001):
+            step(i, 1000)
+    assert seen[0].startswith("ekf ") and seen[1].startswith("compiling 3 of 6 ")
+    assert "1,000 of 1,000 " + 20 * "█" in seen[-2] and seen[-1] == ""
+    assert len(seen) < 200

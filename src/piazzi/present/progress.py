@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import sys
+from time import monotonic
 from types import TracebackType
 from typing import Any
 
 _KERNELS = "piazzi"
+_OFTEN = 0.1  # seconds between two steps of many in a notebook
 
 
 class progress:  # noqa: N801 - a context like those of the standard library
@@ -35,20 +37,14 @@ class progress:  # noqa: N801 - a context like those of the standard library
 
     def __enter__(self) -> progress:
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
         console = self._console or (None if sys.stderr is None else Console(stderr=True))
         if console is None or not (console.is_terminal or console.is_jupyter):
             return self
-        columns = (
-            SpinnerColumn(),
-            TextColumn("{task.description}", markup=False),
-            BarColumn(bar_width=24),
-            TimeElapsedColumn(),
-        )
-        self._bar = Progress(*columns, console=console, transient=True)
-        self._task = self._bar.add_task("", total=None)
-        self._bar.start()
+        if console.is_jupyter:
+            self._bar = _Cell()
+        else:
+            self._bar, self._task = _line(console)
         logger = logging.getLogger(_KERNELS)
         self._level = logger.level
         if not logger.isEnabledFor(logging.INFO):
@@ -73,6 +69,40 @@ class progress:  # noqa: N801 - a context like those of the standard library
             self._bar.update(self._task, completed=step[0], total=step[1], description=f"{step[0]:,} of {step[1]:,}")
         else:
             self._bar.update(self._task, description=str(step[0]))
+
+
+def _line(console: Any) -> tuple[Any, Any]:
+    """A line of a terminal with a bar, and its task."""
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    text = TextColumn("{task.description}", markup=False)
+    bar = Progress(SpinnerColumn(), text, BarColumn(bar_width=24), TimeElapsedColumn(), console=console, transient=True)
+    task = bar.add_task("", total=None)
+    bar.start()
+    return bar, task
+
+
+class _Cell:
+    """A line below a cell of a notebook, which is written anew with every step: no widgets have to be installed for it."""
+
+    def __init__(self) -> None:
+        from IPython.display import display  # it is there in a notebook
+
+        self._handle: Any = display({"text/plain": ""}, raw=True, display_id=True)
+        self._begun = self._last = monotonic()
+
+    def update(self, task: Any, *, description: str, completed: int | None = None, total: int | None = None) -> None:
+        """Of many steps one every tenth of a second."""
+        now = monotonic()
+        if completed is not None and completed != total and now - self._last < _OFTEN:
+            return
+        self._last = now
+        share = "" if completed is None or not total else f" {'█' * (20 * completed // total):░<20}"
+        self._handle.update({"text/plain": f"{description}{share} {now - self._begun:.1f} s"}, raw=True)
+
+    def stop(self) -> None:
+        """Leave nothing."""
+        self._handle.update({"text/plain": ""}, raw=True)
 
 
 class _Compiling(logging.Handler):
