@@ -349,3 +349,27 @@ DATA_STOP
     path.write_text(one + "ORIGINATOR = Y\n" + one)
     with pytest.raises(ValueError, match="line 16: 'ORIGINATOR' stands between segments"):
         pz.read_tracking(path)
+
+
+@pytest.mark.parametrize("quotes", ["''", '""', "\u2018\u2019"])
+def test_names_in_quotes(tmp_path, quotes):
+    text = f"""CCSDS_TDM_VERS = 2.0
+CREATION_DATE = 2011-05-12T00:00:00
+ORIGINATOR = X
+META_START
+TIME_SYSTEM = UTC
+PARTICIPANT_1 = {quotes[0]}DSS-25{quotes[1]}
+PARTICIPANT_2 = O'HIGGINS'S
+MODE = SEQUENTIAL
+PATH = 2,1
+META_STOP
+DATA_START
+RANGE = 2011-05-11T10:26:33 191.4
+DATA_STOP
+"""
+    path = tmp_path / "a.tdm"
+    path.write_text(text, encoding="utf-8")
+    assert pz.read_tracking(path).segments[0].path == ("O'HIGGINS'S", "DSS-25")
+    path.write_text(text.replace("DSS-25", ""), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"has no PARTICIPANT_1"):
+        pz.read_tracking(path)

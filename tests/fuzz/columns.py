@@ -98,6 +98,8 @@ IOD = [
     "12345 98 123UNK 2007 F 20081122112233444 28                      V+095 05",
 ]
 UK = "8406503987697070622352907  01   12200054  +28239  01  4             +60+70     R\n"
+LETTER = "\n".join(["SATOBS", "# clock by radio", *IOD, "12345 98 123A   2007 E 20081122112233444 F flared", "regards"]) + "\n"
+RADIO = "# S band\n58130.50000000 2244012345.5 12.3 4171\n18/01/12 12:00:10.5 2244012245.0 1.1e-3 4553\n"
 RDE = "2420 0405 0.211 1204\n05\n0401203 205744.76 185544+324606 4.0 5.8 3 R\n06\n0401203 000000.5 000000-000010\n999\n"
 PLAIN = """# remark
  2    7734     932 1995  1 29 02 38 37.000      2047.50200   60.4991    16.1932
@@ -131,7 +133,16 @@ class Astrometry(Tracked):
     ending = "tdm"
 
     def texts(self) -> list[str]:
-        return ["\n".join(MPC[1:]) + "\n", "\n".join(MPC[:1]) + "\n", PSV, ADES, "\n".join(IOD) + "\n", UK * 2, RDE]
+        return [
+            "\n".join(MPC[1:]) + "\n",
+            "\n".join(MPC[:1]) + "\n",
+            PSV,
+            ADES,
+            LETTER,
+            UK * 2 + "999\n",
+            "SATOBS\n" + RDE,
+            RADIO,
+        ]
 
 
 class Surveillance(Tracked):
@@ -166,4 +177,5 @@ class Table(Tracked):
 
     def texts(self) -> list[str]:
         plain = "time,x[km],y[km],z[km],vx[m/s],vy[m/s],vz[m/s]\n2024-05-05T12:00:00Z,1,2,3,4,5,6\n"
-        return [DATED, PLACES, plain, TABLE]
+        days = "time[MJD UTC];x[km];y[km];z[km]\n58130.5;1;2;3\n58130.625;1;2;3\n"
+        return [DATED, PLACES, plain, TABLE, days, days.replace("MJD UTC", "unix")]

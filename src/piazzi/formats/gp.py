@@ -37,7 +37,7 @@ def _objects(source: Source, text: str) -> Iterator[tuple[int, Mapping[str, obje
         line, before = line + text.count("\n", before, at), at
         try:
             found, end = decoder.raw_decode(text, at)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             source.refuse(getattr(error, "lineno", line), f"it is no JSON: {getattr(error, 'msg', error)}")
         yield line, found
         at = text.find("{", end)

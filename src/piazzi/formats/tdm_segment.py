@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -116,12 +117,15 @@ def meaning_of(source: Source, items: Sequence[Item], line: int, told: Conventio
     return Meaning(segment, station, seen, angles, kind, RANGE_FACTORS[unit], offset, scale)
 
 
+_QUOTED = re.compile(r"""^(?:'(?=.*'$)|"(?=.*"$)|\u2018(?=.*\u2019$))(.*).$""")  # a name as some programs write it
+
+
 def _participants(source: Source, found: dict[str, Item]) -> tuple[str, ...]:
     people = dict(numbered(found, "PARTICIPANT"))
     for number in range(1, max(people) + 1):
-        if number not in people or not people[number].text:
+        if number not in people or not _QUOTED.sub(r"\1", people[number].text):
             source.refuse(people[max(people)].line, f"{_WHAT} has no PARTICIPANT_{number}")
-    return tuple(people[number].text for number in sorted(people))
+    return tuple(_QUOTED.sub(r"\1", people[number].text) for number in sorted(people))
 
 
 def _paths(source: Source, found: dict[str, Item], people: tuple[str, ...]) -> tuple[list[int] | None, list[int] | None]:
