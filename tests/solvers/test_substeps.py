@@ -110,6 +110,7 @@ def test_a_filter_that_is_lost_with_any_steps_is_told_of():
     assert re.fullmatch(
         r"the estimate diverges with steps of any length: half of its innovations are beyond (\S+) sigma; .*", said
     )
+    assert step_warning(oscillator(10), tracking, limit=1e-15) == said  # nor where runs that are lost agree no better
     own = pz.simulate(replace(oscillator(1), truth=None, integrator=pz.RungeKutta4(10)), tracking.times, rng)
     assert "too long" in step_warning(replace(oscillator(1), integrator=pz.Euler(1)), own)
     assert step_warning(oscillator(10), own) == ""

@@ -24,7 +24,7 @@ def step_warning(problem: Problem, tracking: Tracking, limit: float = SMALL, est
 
     The estimator runs again with four times as many substeps; no other kernel is needed, so a warm call costs what that run
     does.  Where the two differ by more than `limit`, it goes on with 16, 64, ... times as many until two runs in a row agree,
-    and says so where none do.  An estimator that is lost, its innovations (or, where the truth is known, its errors) mostly
+    and says so where none do.  An estimator that is lost by more than they differ, its innovations (or, where the truth is known, its errors) mostly
     beyond five of its own standard deviations, is told of too: its sigma says nothing.  Of a long recording only the first
     20,000 epochs are looked at.
 
@@ -45,7 +45,7 @@ def step_warning(problem: Problem, tracking: Tracking, limit: float = SMALL, est
     while True:
         fine = runner.estimate(_finer(problem, finer), seen)
         between = _moved(before, fine)
-        if between.worst <= limit or finer >= FINEST or finer * FINER * work > WORK:
+        if between.worst <= max(limit, _lost(fine, seen.truth)[0]) or finer >= FINEST or finer * FINER * work > WORK:
             break
         before, finer = fine, finer * FINER
     if not fine.success:
@@ -56,12 +56,13 @@ def step_warning(problem: Problem, tracking: Tracking, limit: float = SMALL, est
 def _sentence(coarse: Estimate, fine: Estimate, between: StepError, finer: int, limit: float, truth: Array | None) -> str:
     """What is to be said of a run, one with `finer` times as many substeps, and the distance of that to the one before it."""
     advice = "give it more substeps, or a method of higher order"
-    if finer > FINER and not between.worst <= limit:
+    far, lost = _lost(fine, truth)
+    if finer > FINER and not between.worst <= max(limit, far):
         return (
             f"the integrator's steps are far too long: even {finer // FINER} and {finer} times as many differ by "
             f"{_at_worst(between)}; {advice}, or use DormandPrince"
         )
-    if lost := _lost(fine, truth):
+    if lost:
         return f"the estimate diverges with steps of any length: {lost}; its sigma is meaningless"
     if not coarse.success:
         return f"the integrator's steps are too long: the estimate is not finite, and is with {finer} times as many; {advice}"
@@ -87,8 +88,11 @@ def _at_worst(moved: StepError) -> str:
     return f"{moved.worst:.2g} sigma in {state!r} at t = {time:g} s"
 
 
-def _lost(estimate: Estimate, truth: Array | None) -> str:
-    """What shows that an estimate has lost its track, "" where nothing does: the median of squares, whatever outliers do."""
+def _lost(estimate: Estimate, truth: Array | None) -> tuple[float, str]:
+    """How many sigma an estimate that has lost its track is off, and what shows it; 0 and "" where nothing does.
+
+    Judged by the median of squares, whatever outliers do.  Where steps move it by less than that, they are not what is wrong.
+    """
     S = np.diagonal(estimate.innovation_covariances, axis1=1, axis2=2)
     P = np.diagonal(estimate.covariance, axis1=1, axis2=2)
     found = {"innovations": (estimate.innovations, S)}
@@ -98,8 +102,8 @@ def _lost(estimate: Estimate, truth: Array | None) -> str:
         there = ~np.isnan(off) & (variance > 0)
         typical = float(np.median(off[there] ** 2 / variance[there])) if there.any() else 0.0
         if typical > LOST:
-            return f"half of its {what} are beyond {typical**0.5:.2g} sigma"
-    return ""
+            return typical**0.5, f"half of its {what} are beyond {typical**0.5:.2g} sigma"
+    return 0.0, ""
 
 
 def _finer(problem: Problem, factor: int) -> Problem:
