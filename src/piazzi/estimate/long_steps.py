@@ -24,8 +24,9 @@ def step_warning(problem: Problem, tracking: Tracking, limit: float = SMALL, est
 
     The estimator runs again with four times as many substeps; no other kernel is needed, so a warm call costs what that run
     does.  Where the two differ by more than `limit`, it goes on with 16, 64, ... times as many until two runs in a row agree,
-    and says so where none do.  An estimator that is lost by more than they differ, its innovations (or, where the truth is known, its errors) mostly
-    beyond five of its own standard deviations, is told of too: its sigma says nothing.  Of a long recording only the first
+    and says so where none do.  An estimator that is lost, its innovations (or, where the truth is known, its errors) mostly
+    beyond five of its own standard deviations, is told of too, and before steps that move it by less: its sigma says nothing.
+    Of a long recording only the first
     20,000 epochs are looked at.
 
     Parameters
