@@ -42,13 +42,14 @@ class Stopped:
 
 
 def follow(files: Sequence[str], case: Case, notes: Any) -> Determination | None:
-    """Follow the last of the files, "-" for standard input, and tell of each row.
+    """Follow the last of the files, "-" for standard input: each row on stdout, each pass as it ends on stderr.
 
     Returns the orbit at its end, None where there is none.
 
     A line that cannot be read is told of on stderr and left.
     """
     from piazzi.determination.following import Following
+    from piazzi.determination.passed import Passes
 
     *before, source = files
     with _interruptible() as stopped:
@@ -56,13 +57,17 @@ def follow(files: Sequence[str], case: Case, notes: Any) -> Determination | None
         live.announce = lambda step: say("an orbit is looked for in the first rows ...")
         stream = live.lines("standard input" if source == STDIN else source)
         sink = Sink(None)
-        begun = False
+        begun, passes = False, Passes()
         for taken in _rows(live, stream, source, stopped):
             if taken and not begun:
                 say(f"an orbit is known from {len(taken)} rows on; {live.name} carries it on")
                 begun = True
             for row in taken:
+                for over in passes.take(row):
+                    say(str(over))
                 sink.emit(json.dumps(row.to_dict(), allow_nan=False) if case.json else str(row))
+        for over in passes.end():
+            say(str(over))
     if not live.success:
         say(f"not determined: {live.waiting}")
         return None
