@@ -23,8 +23,8 @@ finally:
 PAGES = sorted(p for p in DOCS.rglob("*.md") if any(b.language in ("python", "console") for b in blocks.blocks(p.read_text())))
 
 
-QUICK = {"pendulum", "car", "which-window", "thousand-runs"}
-SLOW = {"sensors", "ceres"} | {p.stem for p in (DOCS / "gallery").glob("*.md")} - QUICK  # kernels of half a minute
+SLOW = {"sensors", "ceres", "determine", "orbits", "own-problem", "bearing-only"}  # kernels of more than five seconds
+SLOW |= {p.stem for p in (DOCS / "gallery").glob("*.md")}
 
 
 @pytest.mark.parametrize("page", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in SLOW)) for p in PAGES])

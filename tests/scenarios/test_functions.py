@@ -239,11 +239,14 @@ def again(problem):
 @pytest.mark.parametrize(
     "words",
     [
-        {"degree": 4, "drag": "harris-priester"},
-        {"degree": 4, "tides": ("solid", "k1", "pole"), "relativity": ("schwarzschild", "lense-thirring", "de-sitter")},
-        {"about": "sun"},
+        pytest.param({"degree": 4, "drag": "harris-priester"}, id="harris-priester", marks=pytest.mark.slow),
+        pytest.param(
+            {"degree": 4, "tides": ("solid", "k1", "pole"), "relativity": ("schwarzschild", "lense-thirring", "de-sitter")},
+            id="tides, relativity",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param({"about": "sun"}, id="sun"),
     ],
-    ids=["harris-priester", "tides, relativity", "sun"],
 )
 def test_all_data_of_forces_are_written(words):
     forces = pz.earth.Forces(**words)
