@@ -13,6 +13,7 @@ SECTIONS = {
     "study": "many runs in lanes beside the C floor, and a study of 10,000 runs: time, memory, second core",
     "live": "one measurement at a time",
     "space": "orbits about the Earth beside the C floor: field, tables, steps, days with transition matrix",
+    "determine": "a day of low orbit, three radars, 2000 ranges: iterations beside the C floor, whole processes, kernels",
     "files": "files of a million measurements",
     "length": "time per epoch and memory against the number of epochs",
 }
