@@ -15,8 +15,6 @@ import numpy as np
 import orbits
 from figures import Figure, UnavailableError
 from floor.space import build, pointer, weights
-from sections.space import _beside, _timed
-from sections.start_up import _cpu
 
 import piazzi as pz
 from piazzi import earth
@@ -28,6 +26,8 @@ from piazzi.evaluate.information import predicted
 from piazzi.formats import Correction, Observations, Segment
 from piazzi.formats.write_csv import csv_text
 from piazzi.problem.inputs import prepare
+from sections.space import _beside, _timed
+from sections.start_up import _cpu
 
 ROWS, EVERY, SIGMA, STEP = 2000, 2.0, 5.0, 30.0
 SITES = {"NORTH": (78.2, 15.4), "WEST": (34.0, -118.0), "SOUTH": (-33.9, 18.4)}
