@@ -28,7 +28,7 @@ SIGMA = 0.03
 def test_what_to_hold_is_read_and_refused():
     assert [check(how) for how in ("last", "passes", "1/4", 0.25)] == ["last", "passes", 0.25, 0.25]
     for wrong in ("first", "0", "5/4", "1/0", "-1/2"):
-        with pytest.raises(ValueError, match="write last, passes, or a share such as 1/4"):
+        with pytest.raises(ValueError, match="write last, passes, none, or a share such as 1/4"):
             check(wrong)
     with pytest.raises(ValueError, match="hold"):
         pz.determine("nowhere.npt", hold="all of it")

@@ -14,6 +14,7 @@ import numpy as np
 import piazzi as pz
 from piazzi import earth
 from piazzi.determination import Guess
+from piazzi.determination.case import Case
 from piazzi.determination.determining import prepared, ready, solved
 from piazzi.determination.fit import estimators
 from piazzi.determination.setup import follow
@@ -199,14 +200,11 @@ def predictions(kind, count, other=None, days=(1, 2, 3), first=0):
         z = predicted(truth.problem, prepare(truth.problem, truth.tracking), states[: len(rows)])
         z = z + kind.sigma * rng.standard_normal(z.shape)
         tracking = pz.Tracking(given.tracking.row_times, z, given.tracking.row_stations, epoch=given.tracking.epoch)
-        found = solved(ready(replace(given, tracking=tracking)), estimators(("graph",)))
-        each = []
-        for k, t in enumerate(ahead.tolist()):
-            when = given.measured.epoch + t
-            axes = state_axes(states[len(rows) + k, :3], states[len(rows) + k, 3:6])
-            error = axes[:3, :3] @ (found.orbit.at(when)[:3] - states[len(rows) + k, :3])
-            each.append(error**2 / np.diag(found.orbit.covariance(when, "RTN"))[:3])
-        out.append(each)
+        found = solved(ready(replace(given, tracking=tracking)), estimators(("graph",)), case=Case(hold="none"))
+        mean, roots = found.orbit.states([given.measured.epoch + t for t in ahead.tolist()])
+        axes = np.array([state_axes(x[:3], x[3:6])[:3, :3] for x in states[len(rows) :]])
+        error = np.einsum("kij,kj->ki", axes, mean[:, :3] - states[len(rows) :, :3])
+        out.append(error**2 / np.sum((axes @ roots[:, :3]) ** 2, axis=2))
     return np.array(out)
 
 

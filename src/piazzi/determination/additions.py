@@ -53,7 +53,8 @@ def _one(name: str, one: Asked, chosen: Chosen, seen: Measured, numbers: Numbers
         return Extra()
     if one.what.is_process:
         relative = name in COEFFICIENTS.values()
-        steady = one.what.size("" if relative else unit_of(name), SHARES.get(name, ACCELERATION))
+        usual = SHARES.get(name, ACCELERATION)
+        steady = usual if one.what.sigma is None else one.what.size("", 0.0) if relative else _in_si(one, name)
         if name not in numbers.roles:
             numbers.roles[name] = "fixed"
         return motion.process(name, one, steady, relative, unit_of(name), definitions, numbers)

@@ -128,7 +128,7 @@ class Case:
         section=("product", "step"),
     )
     hold: Any = said(
-        None, "ROWS", "Rows to predict without them: last, passes (each in turn), or a share such as 1/4.  "
+        None, "ROWS", "Rows to predict without them: last, passes (each in turn), a share such as 1/4, or none.  "
         "[default: passes, where there are 3 to 60]", read.hold,
     )  # fmt: skip
     covariance: str = asked(

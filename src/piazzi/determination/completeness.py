@@ -80,19 +80,28 @@ def _gravity(given: Setup, states: Array) -> Iterator[tuple[str, Array]]:
 
 def _others(given: Setup, states: Array, analysis: Analysis) -> Iterator[tuple[str, Array]]:
     """What other forces change of whitened measurements (J, m)."""
-    times, rows = given.tracking.times, given.tracking.row_times
-    turns = float(times[-1] - times[0]) * given.measured.centre.turning(states[0, :3], states[0, 3:6]) / (2.0 * np.pi)
-    count = min(max(ceil(NODES * turns), NODES), MOST)
-    t = np.linspace(times[0], times[-1], count + 1)
+    rows = given.tracking.row_times
+    t, path, back = carrying(given, states)
     if not t[-1] > t[0]:
         return
-    path, Phi = follow(given.problem, t, states[0], given.chosen.max_step)
-    back = np.linalg.solve(products(Phi)[:, :6, :6], np.eye(6)[:, 3:])  # of the first state, by a change of velocity then
     for name, pull in _pulls(given, t, path):
         rate = (back @ pull[:, :, None])[..., 0]
         total = np.vstack([np.zeros(6), np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)[:, None], axis=0)])
         change = np.stack([np.interp(rows, t, total[:, i]) for i in range(6)], axis=1)
         yield name, -np.einsum("jmi,ji->jm", analysis.rows[..., :6], change)
+
+
+def carrying(given: Setup, states: Array) -> tuple[Array, Array, Array]:
+    """Times (K,) close over the measurements, the solution (K, n), and the first state (K, 6, 3) by the velocity then."""
+    times = given.tracking.times
+    turns = float(times[-1] - times[0]) * given.measured.centre.turning(states[0, :3], states[0, 3:6]) / (2.0 * np.pi)
+    count = min(max(ceil(NODES * turns), NODES), MOST)
+    t = np.linspace(times[0], times[-1], count + 1)
+    if not t[-1] > t[0]:
+        return t, states[:1], np.zeros((1, 6, 3))
+    path, Phi = follow(given.problem, t, states[0], given.chosen.max_step)
+    back = np.linalg.solve(products(Phi)[:, :6, :6], np.eye(6)[:, 3:])
+    return t, path, back
 
 
 def _pulls(given: Setup, t: Array, path: Array) -> Iterator[tuple[str, Array]]:

@@ -24,7 +24,7 @@ from piazzi.determination.editing import edited
 from piazzi.determination.faults import BEYOND, CORRELATED, Faults, named
 from piazzi.determination.fit import begun, estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
-from piazzi.determination.holding import Held, held, unasked
+from piazzi.determination.holding import NONE, Held, held, unasked
 from piazzi.determination.initial import initial_orbits
 from piazzi.determination.initial_result import InitialOrbits
 from piazzi.determination.instruments import with_instruments
@@ -280,9 +280,12 @@ def _unseen(
 ) -> Held | None:
     """What rows that are held back say of the answer; None where there is nothing to hold back."""
     how = hold or unasked(given, keep)
-    if how is None or analysis is None or not answer.success or (given.problem.is_noise_free and answer.view != "delayed"):
+    if how in (None, NONE) or analysis is None or not answer.success:
         return None
-    return held(given, estimator, answer, analysis, keep, how)
+    if given.problem.is_noise_free and answer.view != "delayed":
+        return None
+    found = held(given, estimator, answer, analysis, keep, how)
+    return found if found.groups or hold else None
 
 
 def _answered(given: Setup, estimator: Estimator) -> tuple[Array, Array, Estimate, Analysis | None]:

@@ -1,7 +1,10 @@
 """Which rows are believed: tested by what the others say of them, decided anew until nothing changes.
 
 A row's residual is compared with what it should be like: R - H P H^T of a row that was used, whose residual the fit has made
-smaller, R + H P H^T of one that was not (Carpino, Milani and Chesley 2003, Icarus 166, 248).
+smaller, R + H P H^T of one that was not (Carpino, Milani and Chesley 2003, Icarus 166, 248).  Of right rows one in fifty lies
+beyond a chi-square of 8, and an orbit without them errs by more than its covariance says, a seventh of the squares.  So
+the gate is wider where so few rows are beyond it that chance explains them: at most one in twenty of those that are left out
+is right (Benjamini and Hochberg 1995, J. R. Stat. Soc. B 57, 289).
 """
 
 from __future__ import annotations
@@ -17,7 +20,9 @@ from piazzi.determination.setup import Setup, scale_of
 from piazzi.estimate.chi_square import quantile
 from piazzi.problem.checks import Array
 
-OUT, BACK = 1.0 - exp(-4.0), 1.0 - exp(-3.5)  # chi-square of 8 and 7 with two degrees of freedom
+OUT, BACK = exp(-4.0), exp(0.5)  # probability beyond a chi-square of 8 with two degrees of freedom; and times that beyond 7
+GATES = OUT * 0.5 ** np.arange(31)
+CHANCE = 0.05  # of the rows beyond the gate, that may be right
 SPARE = 8  # values beyond the unknowns, below which nothing is left out
 ROUNDS = 20
 MOST = 0.2  # of the rows: so many are not left out
@@ -65,19 +70,30 @@ def _settled(given: Setup, analysis: Analysis, keep: Array, repeated: Array, the
     """The rows that are kept when nothing changes any more, or after `ROUNDS`."""
     unit = scale_of(given, given.states[0])
     degrees = there.sum(axis=1)
-    out = np.array([np.inf] + [quantile(OUT, m) for m in range(1, there.shape[1] + 1)])[degrees]
-    back = np.array([np.inf] + [quantile(BACK, m) for m in range(1, there.shape[1] + 1)])[degrees]
     wide = np.inf
     for _ in range(ROUNDS):
         squared = _squared(analysis, keep, unit, there)
         own = squared[keep & (degrees > 0)] / degrees[keep & (degrees > 0)]
         middle = float(np.median(own)) / 0.4549 if own.size else 1.0  # of a chi-square with one degree of freedom
         wide = min(wide, max(1.0, middle))
-        new = np.where(keep, squared <= out * wide, squared < back * wide) & ~repeated
+        gate = _gate(squared[~repeated] / wide, degrees[~repeated])
+        out, back = (_beyond(p, degrees) * wide for p in (gate, BACK * gate))
+        new = np.where(keep, squared <= out, squared < back) & ~repeated
         if (new == keep).all() or there[new].sum() < given.problem.model.n + SPARE:
             break
         keep = new
     return keep
+
+
+def _gate(squared: Array, degrees: Array) -> float:
+    """The probability at the gate: the largest at which chance puts few of the rows beyond it there."""
+    many = np.count_nonzero(degrees)
+    return next((g for g in GATES.tolist() if np.sum(squared > _beyond(g, degrees)) * CHANCE >= many * g), float(GATES[-1]))
+
+
+def _beyond(probability: float, degrees: Array) -> Array:
+    """The chi-square that is exceeded with it, of each number of degrees of freedom."""
+    return np.array([np.inf] + [quantile(1.0 - probability, m) for m in range(1, int(degrees.max(initial=0)) + 1)])[degrees]
 
 
 def _squared(analysis: Analysis, keep: Array, unit: Array, there: Array) -> Array:

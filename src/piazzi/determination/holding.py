@@ -27,7 +27,9 @@ from piazzi.problem.checks import Array
 from piazzi.problem.inputs import wrapped
 from piazzi.text import brief
 
+NONE = "none"
 MANY = 60  # passes, beyond which not each is left out unasked
+SHARE = 0.25  # of the rows, the last ones, where passes are fewer or more
 NEAR, ROUNDS = 0.1, 4  # sigma of a last step from solution to solution, and how many
 WITHIN = 0.95  # of a row's own prediction: what coverage counts
 GOOD = 2.0  # of the squares per degree of freedom, above which predictions are worse than their sigmas say
@@ -79,8 +81,8 @@ class Held:
     @property
     def coverage(self) -> float:
         """The share of values within their own 95 %."""
-        inside = np.concatenate([one.inside.reshape(-1) for one in self.groups])
-        return float(np.nanmean(inside))
+        inside = [one.inside.reshape(-1) for one in self.groups]
+        return float(np.nanmean(np.concatenate(inside))) if inside else np.nan
 
     @property
     def honest(self) -> bool:
@@ -89,9 +91,9 @@ class Held:
 
 
 def check(how: Any) -> str | float:
-    """The word last or passes, or the share that a text such as 1/4 or 0.25 says; raises ValueError for anything else."""
+    """A word, last, passes or none, or the share that a text such as 1/4 says; raises ValueError for anything else."""
     text = str(how).strip()
-    if text in ("last", "passes"):
+    if text in ("last", "passes", NONE):
         return text
     above, slash, below = text.partition("/")
     try:
@@ -99,7 +101,7 @@ def check(how: Any) -> str | float:
     except (ValueError, ZeroDivisionError):
         share = np.nan
     if not 0.0 < share < 1.0:
-        raise ValueError(f"{text[:40]!r} is no part of the rows: write last, passes, or a share such as 1/4")
+        raise ValueError(f"{text[:40]!r} is no part of the rows: write last, passes, none, or a share such as 1/4")
     return share
 
 
@@ -151,9 +153,11 @@ def held(given: Setup, estimator: Estimator, answer: Estimate, analysis: Analysi
     return Held(how if isinstance(how, str) else f"{how:.3g}", tuple(found), len(groups) - len(found))
 
 
-def unasked(given: Setup, keep: Array) -> str | None:
-    """How to hold rows back where nobody says it: each pass, where there are a few and it costs next to nothing."""
-    return "passes" if given.problem.is_noise_free and 3 <= len(passes(given, keep)) <= MANY else None
+def unasked(given: Setup, keep: Array) -> str | float | None:
+    """How to hold rows back where nobody says it and it costs next to nothing: each pass, or the last rows of one long arc."""
+    if not given.problem.is_noise_free:
+        return None
+    return "passes" if 3 <= len(passes(given, keep)) <= MANY else SHARE
 
 
 def _groups(given: Setup, keep: Array, how: str | float) -> Sequence[Array]:

@@ -13,6 +13,7 @@ from piazzi.determination.common import together
 from piazzi.determination.completeness import left_out
 from piazzi.determination.faults import STATION, Faults
 from piazzi.determination.holding import GOOD, Held, labels_of
+from piazzi.determination.remedies import remedy
 from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate
@@ -71,7 +72,7 @@ def verdict(
                 seen(given, analysis, keep),
                 alone(given),
                 converged(given, answer, analysis, keep),
-                unseen(honest(given, analysis, keep, faults), held),
+                explained(given, answer, analysis, keep, unseen(honest(given, analysis, keep, faults), held)),
                 agreed(given, name, estimates),
                 complete(given, answer, analysis, keep),
             ),
@@ -190,8 +191,7 @@ def _fitted(given: Setup, analysis: Analysis | None, keep: Array, reasons: Array
         size = float(np.sqrt(shared[0] / shared[1]))
         return Sentence(
             False, size, f"{test}; medians of passes likewise",
-            f"Not honest: residuals of a pass go together, by {number(size, 3)} times what their sigmas allow: "
-            "--estimate bias.KIND/pass stands for that.",
+            f"Not honest: residuals of a pass go together, by {number(size, 3)} times what their sigmas allow.",
         )  # fmt: skip
     if total > high:
         return Sentence(
@@ -219,6 +219,14 @@ def unseen(fitted: Sentence, held: Held | None) -> Sentence:
         figure = fitted.figure if held.honest else max(fitted.figure or 0.0, float(np.sqrt(held.nees)))
         return Sentence(fitted.ok, figure, test, f"{fitted.sentence} {found[0].upper()}{found[1:]}.")
     return Sentence(False, float(np.sqrt(held.nees)), test, f"Not honest: {found}.")
+
+
+def explained(given: Setup, answer: Estimate, analysis: Analysis | None, keep: Array, said: Sentence) -> Sentence:
+    """The sentence on residuals with the option that explains them best, where they are not as they should be."""
+    if said.ok is not False or said.figure is None or analysis is None or answer.view != "delayed" or not answer.success:
+        return said
+    words = remedy(given, answer.mean, analysis, keep)
+    return replace(said, sentence=f"{said.sentence} Explained by {words}.") if words else said
 
 
 def complete(given: Setup, answer: Estimate, analysis: Analysis | None, keep: Array) -> Sentence:
