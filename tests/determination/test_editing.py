@@ -9,11 +9,12 @@ import piazzi as pz
 from piazzi.determination import Guess
 from piazzi.determination.analysis import analysed
 from piazzi.determination.approach import approached
-from piazzi.determination.completeness import left_out
+from piazzi.determination.completeness import left_out, words_for
 from piazzi.determination.determining import prepared, solved
 from piazzi.determination.editing import edited
 from piazzi.determination.faults import CLOCK, MASK, OUTLIER, SETTLING, STATION
 from piazzi.determination.fit import estimators
+from piazzi.earth.defaults import read_forces
 from piazzi.evaluate.information import predicted
 from piazzi.formats import Observations, Segment
 from piazzi.problem.inputs import prepare
@@ -152,6 +153,19 @@ def test_complete_is_what_a_fit_with_the_larger_field_changes(given):
     assert found["gravity to degree 12 instead of degree 6"] == pytest.approx(expected, rel=0.05)
     said = small.verdict["complete"]
     assert said.figure == max(found.values()) and said.ok is (said.figure <= 1.0)
+    named = {
+        "gravity to degree 12 instead of degree 6",
+        "tides by frequency",
+        "frame dragging",
+        "the pull of Venus",
+        "sunlight",
+    }
+    words = words_for(small.setup, sorted(named))
+    assert read_forces(words, 6000e3).forces.degree == 12 and words.startswith(
+        "default relativity=schwarzschild,lense-thirring "
+    )
+    assert words.endswith("degree=12 radiation=cannonball bodies=sun,moon,venus tides=solid,k1")
+    assert said.ok or f"--forces '{words_for(small.setup, [n for n, moved in found.items() if moved > 1.0])}'" in said.sentence
 
 
 @pytest.mark.parametrize(("switch", "name"), [("moon_on", "the pull of Moon"), ("relativity_on", "relativity")])

@@ -6,7 +6,7 @@ by the solution's own derivatives: to first order the orbit is another one at ea
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from math import ceil
 from typing import Any
@@ -60,6 +60,29 @@ def left_out(given: Setup, states: Array, analysis: Analysis, keep: Array) -> di
 
     found = {name: moved(off) for name, off in (*_gravity(given, states), *_others(given, states, analysis))}
     return dict(sorted(found.items(), key=lambda one: -one[1]))
+
+
+def words_for(given: Setup, names: Iterable[str]) -> str:
+    """What --forces says with these of `left_out` among the forces."""
+    own = given.chosen.forces
+    lists: dict[str, list[str]] = {"tides": list(own.tides), "bodies": list(own.bodies), "relativity": []}
+    lists["relativity"] = list(RELATIVITY[:1] if own.relativity is True else own.relativity or ())
+    switches, words = {name: switch for switch, name in WORDS.items()}, dict[str, str]()
+    of = {**dict(zip(("tides_on", "k1_on", "pole_on"), TIDES, strict=True)),
+          **dict(zip(("relativity_on", "lense_thirring_on", "de_sitter_on"), RELATIVITY, strict=True))}  # fmt: skip
+    for name in names:
+        switch = switches.get(name, "")
+        if name.startswith("gravity"):
+            words["degree"] = name.split()[3]
+        elif switch in ("radiation_on", "drag_on"):
+            words |= {"radiation": "cannonball"} if switch == "radiation_on" else {"drag": "harris-priester"}
+        else:
+            part = of.get(switch) or name.split()[-1].lower()
+            key = next((k for k, known in (("tides", TIDES), ("relativity", RELATIVITY)) if part in known), "bodies")
+            lists[key].append(part)
+            words[key] = ",".join(lists[key])
+    start = "default " if given.chosen.choice.source.startswith("default") else ""
+    return start + " ".join(f"{key}={value}" for key, value in words.items())
 
 
 def _gravity(given: Setup, states: Array) -> Iterator[tuple[str, Array]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis, of_orbit
 from piazzi.determination.common import together
-from piazzi.determination.completeness import left_out
+from piazzi.determination.completeness import left_out, words_for
 from piazzi.determination.faults import STATION, Faults
 from piazzi.determination.holding import GOOD, Held, labels_of
 from piazzi.determination.remedies import remedy
@@ -240,9 +240,10 @@ def complete(given: Setup, answer: Estimate, analysis: Analysis | None, keep: Ar
         return none
     worst = max(found.values())
     said = [f"{name} by {number(moved, 2)}" for name, moved in found.items()]
-    large = [text for text, moved in zip(said, found.values(), strict=True) if moved > 1.0]
+    large = [name for name, moved in found.items() if moved > 1.0]
     if large:
-        return Sentence(False, worst, test, f"Not complete: the solution would move, in sigma, with {', '.join(large)}.")
+        words = f"{', '.join(said[: len(large)])}: --forces '{words_for(given, large)}'"
+        return Sentence(False, worst, test, f"Not complete: the solution would move, in sigma, with {words}.")
     return Sentence(True, worst, test, f"Complete: the solution would move, in sigma, with {', '.join(said[:TOLD])}.")
 
 
