@@ -94,7 +94,7 @@ def part_of(context: Context, sensor: Any, given: Any, rows: Array, factor: floa
     sigma = factor * observations.sigma[rows]
     return Part(
         sensor, given["name"], observations.t[rows], factor * observations.value[rows, None], (sigma**2)[:, None, None],
-        rows[:, None], given["place"], given["numbers"], sensor.functions(context.epoch), **others,
+        rows[:, None], given["place"], given["numbers"], context.functions(sensor), **others,
     )  # fmt: skip
 
 

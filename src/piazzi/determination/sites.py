@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -85,6 +85,11 @@ class Context:
             reason = f"rows when no orbit of {partner.name} is given"
             self.left[reason] = self.left.get(reason, 0) + int((~usable).sum())
         return sensor.at(None, self.epoch, 1.0, name=partner.name, place=table, **known), rows[usable]
+
+    def functions(self, sensor: Any) -> dict[str, Any]:
+        """The data of a sensor's functions: a transmitter is seen from what the orbit goes about, as a receiver is."""
+        found = sensor.functions(self.epoch).items()
+        return {name: replace(own, about=self.about) if isinstance(own, Place) else own for name, own in found}
 
     @property
     def where(self) -> str:
