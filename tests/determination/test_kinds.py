@@ -9,6 +9,7 @@ import piazzi as pz
 from piazzi import earth
 from piazzi.determination import Guess
 from piazzi.determination.determining import prepared
+from piazzi.determination.residuals import units_of
 from piazzi.earth.stations import Coordinates
 from piazzi.evaluate.information import predicted
 from piazzi.formats import Arc, Ephemeris, Observations, Segment
@@ -214,6 +215,15 @@ def test_echoes_of_radar(kind):
     made, off = left_over(given)
     assert np.abs(off).max() < (1.0 if kind == "time_of_flight" else 1e-4)  # m, m/s
     assert made.problem.model.sensors[0].components == (("range",) if kind == "time_of_flight" else ("range_rate",))
+
+
+@pytest.mark.parametrize("kind, unit", [("time_of_flight", "m"), ("doppler", "m/s"), ("range", "m"), ("range_rate", "m/s")])
+def test_residuals_have_the_unit_of_what_is_compared(kind, unit):
+    given = rows(kind, np.full(len(T), 0.01), 1e-7, way="two-way", path=("A", "SAT", "A"), range_is="half",
+                 frequencies=(("transmit", 2.38e9),))  # fmt: skip
+    made = prepared(given, guess=Guess(EPOCH, R, V, "test"), stations=SITES, forces="none", corrections="applied")
+    which = made.tracking.stations_of(made.problem)
+    assert {*units_of(made.problem, which, np.zeros(len(which), dtype=int), [kind] * len(which))} == {unit}
 
 
 @pytest.mark.parametrize("sender", ["A", pytest.param("B", marks=pytest.mark.slow)])

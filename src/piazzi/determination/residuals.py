@@ -34,10 +34,18 @@ def table(found: Any) -> dict[str, Array]:
     weight = np.ones(len(rows)) if weights is None else np.asarray(weights)[rows]
     return {
         "t": given.tracking.row_times[rows], "station": labels, "component": kinds,
-        "unit": np.array([KINDS[kind].unit for kind in kinds], dtype=object), "observed": observed,
+        "unit": units_of(given.problem, which, components, kinds), "observed": observed,
         "computed": computed, "o_minus_c": residual, "whitened": whitened, "sigma": sigma,
         "weight": np.where(used, weight, 0.0), "used": used, "reason": found.reasons[rows], "observation": observation,
     }  # fmt: skip
+
+
+def units_of(problem: Any, which: Array, components: Array, kinds: Array) -> Array:
+    """Units of measurements as sensors have them: of a time of flight it is half the way, in metres."""
+    sensors = {sensor.name: sensor for sensor in problem.model.sensors}
+    own = [sensors[problem.stations[i].sensor] for i in which]
+    said = [dict(one.units).get(one.components[c], "") for one, c in zip(own, components, strict=True)]
+    return np.array([unit or KINDS[kind].unit for unit, kind in zip(said, kinds, strict=True)], dtype=object)
 
 
 def groups(found: Any) -> list[dict[str, Any]]:
