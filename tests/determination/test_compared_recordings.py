@@ -14,7 +14,7 @@ from piazzi.evaluate.metrics import residual_rms
 
 pytestmark = pytest.mark.slow  # kernels of a minute
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "real-orbits.md"
-ESTIMATORS = ("batch", "graph", "smoother", "ekf", "window:50")
+ESTIMATORS = ("batch", "graph", "smoother", "smoother:3", "ekf", "window:2", "window:50")
 LAGEOS = np.array([7526994.072, -9646309.832, 1464110.239])  # m, EME2000, 2016-02-13T16:00:00 UTC, of another laboratory
 BOOK = np.array([5748.6070, 2679.9324, 3442.7902, 4.330460, -1.922874, -5.726562]) * 1e3  # Vallado, example 10-4
 
