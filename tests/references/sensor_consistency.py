@@ -73,7 +73,7 @@ def problem_of(name):
         return _both()
     places, numbers = {s.name: None for s in SITES}, {}
     if name == "position":
-        made, sigma = sensors.position("position", velocity=True, axes="ITRF"), [3.0] * 3 + [0.01] * 3
+        made, sigma = sensors.position("position", velocity=True, frame="ITRF"), [3.0] * 3 + [0.01] * 3
         places = {"receiver": None}
     elif name == "pseudorange":
         made, sigma = sensors.pseudorange(), 1.0
