@@ -354,6 +354,36 @@ def test_pseudoranges_are_from_where_the_signal_was_sent_with_both_clocks():
         left_over(given)
 
 
+@pytest.mark.parametrize("about", ["earth", "sun"])
+@pytest.mark.parametrize("axes", ["GCRF", "ITRF"])
+def test_directions_from_observers_that_move(about, axes):
+    """The line from where the observer was to where the body was when the light left it, on the axes of the catalogue."""
+    mu = earth.constants.GM["sun"] if about == "sun" else GM
+    centre, speed = (a[0] for a in earth.body("earth", [EPOCH], "sun")) if about == "sun" else (np.zeros(3), np.zeros(3))
+    start = (centre + np.array([2e11, 1e11, 5e10]), speed + np.array([3e3, -2e3, 1e3])) if about == "sun" else (R, V)
+    there = np.array([[-3e6, 5e6, 2.5e6], [-2e6, 5.5e6, 2.6e6], [-1e6, 6e6, 2.4e6], [1e6, 6.1e6, 2.2e6]])
+    dates = [EPOCH + float(t) for t in T]
+    here = there if axes == "GCRF" else earth.transform(there, None, "ITRF", "GCRF", dates)[0]
+    if about == "sun":
+        here = here + earth.body("earth", dates, "sun")[0]
+    tau = np.zeros(4)
+    for _ in range(20):
+        line = pz.propagate_kepler(*start, mu, T - tau)[0] - here
+        tau = np.linalg.norm(line, axis=1) / C
+    angles = np.arctan2(line[:, 1], line[:, 0]) % (2 * np.pi), np.arctan2(line[:, 2], np.hypot(line[:, 0], line[:, 1]))
+    kind = "astrometric" if about == "sun" else "geocentric"
+    given = rows(("right_ascension", "declination"), angles, 1e-6, receiver="G05", angles=kind, frame="GCRF", way="one-way")
+    given = replace(given, place=np.tile(np.arange(4), 2), places=there, extra={"place_axes": np.full(8, axes)})
+    words = {"guess": Guess(EPOCH, *start, "test", about=about), "forces": "none", "about": about}
+    made = prepared(given, **words)
+    z = np.asarray(predicted(made.problem, prepare(made.problem, made.tracking), made.states))
+    assert np.abs((made.tracking.values - z + np.pi) % (2 * np.pi) - np.pi).max() < 1e-10
+    if axes == "GCRF":
+        seen = replace(given, segments=(replace(given.segments[0], angles="apparent"),))
+        with pytest.raises(ValueError, match="from space depend on a velocity"):
+            prepared(seen, **words)
+
+
 def test_rows_beyond_the_orbit_of_a_participant_are_counted():
     values = np.linalg.norm(orbit(OTHER, T)[:, :3] - sat(T)[:, :3], axis=1)
     given = rows("range", values, 0.1, "TWIN", "SAT", way="one-way", path=("SAT", "TWIN"), range_is="sum")

@@ -11,11 +11,13 @@ import numpy as np
 from piazzi.determination.parts import Part
 from piazzi.determination.ranging import EVENTS, passes
 from piazzi.determination.sites import Context, weather_of
-from piazzi.earth import Place, sensors
+from piazzi.earth import Place, body, sensors, transform
 from piazzi.earth.rotation import frame_named
 from piazzi.formats import TAGS
+from piazzi.outside.table import Table
 from piazzi.problem.checks import Array
 
+SHIFTS = tuple(30.0 * k - 105.0 for k in range(8))  # s, of the table about a row of an observer that moves
 GEOCENTRE = "500"  # of the Minor Planet Center: reduced to the centre of the Earth
 AZEL, RADEC = ("azimuth", "elevation"), ("right_ascension", "declination")
 XEYN, XSYE = ("x_east", "y_north"), ("x_south", "y_east")
@@ -30,8 +32,13 @@ def mounts(context: Context, index: Array) -> Sequence[Part]:
 
 
 def ascensions(context: Context, index: Array) -> Sequence[Part]:
-    """Rows of right ascension and declination, likewise."""
-    return [_part(context, rows, RADEC) for rows in passes(context, index)]
+    """Rows of right ascension and declination, likewise; of an observer that moves those of each place."""
+    place = context.observations.place
+    return [
+        _part(context, rows[place[rows] == k], RADEC)
+        for rows in passes(context, index)
+        for k in np.unique(place[rows]).tolist()
+    ]
 
 
 def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
@@ -39,11 +46,9 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
     rows = paired(context, index, kinds)
     first = int(index[0])
     segment = observations.segments[observations.segment[first]]
-    if observations.place[index].max() >= 0:
-        raise ValueError(f"{context.where}directions from observers that move are not determined from yet")
     number = int(observations.station[first])
-    partner = context.partner(number)
-    nowhere = partner is not None or (number >= 0 and observations.participants[number] == GEOCENTRE)
+    partner, moving = context.partner(number), int(observations.place[first]) >= 0
+    nowhere = partner is not None or moving or (number >= 0 and observations.participants[number] == GEOCENTRE)
     site = None if nowhere else context.site(number)
     tag = EVENTS[TAGS[observations.tag[first]] or segment.tag or "bounce"]
     if kinds != RADEC:
@@ -57,7 +62,10 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
         if segment.angles is None:
             raise ValueError(f"{context.where}what are the directions? --angles astrometric, geocentric or apparent")
         sensor = _ascension(segment.angles, frame_named(segment.frame or "GCRF"), tag, context.clocks, context.about)
-    if site is None and partner is None:
+    if moving:
+        name = observations.participants[number] if number >= 0 else "observer"
+        given = sensor.at(None, context.epoch, 1.0, name=name, place=_about_its_row(context, first, segment.angles))
+    elif site is None and partner is None:
         place = Place(None, context.epoch, about=context.about)
         given = sensor.at(None, context.epoch, 1.0, name=GEOCENTRE, place=place)
     else:
@@ -77,6 +85,29 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
     return Part(
         sensor, given["name"], t, values, noise, rows, given["place"], given["numbers"], sensor.functions(context.epoch)
     )
+
+
+def _about_its_row(context: Context, row: int, angles: str | None) -> Table:
+    """Where an observer that moves is when it measures a row; on the Earth it turns with it, in space it stands still.
+
+    Raises
+    ------
+    ValueError
+        For apparent directions from space, whose aberration is by a velocity that nobody says.
+    """
+    observations = context.observations
+    dates = [observations.instant(row) + shift for shift in SHIFTS]
+    r = np.tile(observations.places[observations.place[row]], (len(dates), 1))
+    v = np.zeros_like(r)
+    if str(observations.extra["place_axes"][row]) == "ITRF":
+        r, v = (np.asarray(a) for a in transform(r, v, "ITRF", "GCRF", dates))
+    elif angles == "apparent":
+        raise ValueError(f"{context.where}apparent directions from space depend on a velocity that the file does not say")
+    if context.about == "sun":
+        place, velocity = body("earth", dates, "sun")
+        r, v = r + place, v + velocity
+    t = observations.t[row] + (observations.epoch - context.epoch)
+    return Table(t + np.array(SHIFTS), np.hstack([r, v]))
 
 
 def paired(context: Context, index: Array, kinds: tuple[str, ...]) -> Array:
