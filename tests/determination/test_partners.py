@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi import earth
 from piazzi.determination import Guess
 from piazzi.determination.determining import prepared, ready, solved
 from piazzi.determination.fit import estimators
@@ -132,3 +133,34 @@ def test_pseudoranges_of_four_satellites_need_no_guess():
     found = prepared(seen, participant=PARTICIPANTS, **words)
     assert found.guess.source == "the pseudoranges"
     assert np.linalg.norm(found.states[0, :3] - made.states[0, :3]) < 2e3  # clocks of who sent are not in these values
+
+
+@pytest.mark.slow
+def test_an_asteroid_that_a_satellite_sees_needs_no_guess():
+    """Seven weeks of directions from an orbit about the Earth, two days apart."""
+    rng, t = np.random.default_rng(2), np.arange(0.0, 4.1e6, 172800.0)
+    dates = [EPOCH + float(x) for x in t]
+    centre = earth.body("earth", dates, "sun")[0]
+    turn = np.arange(len(t))
+    places = np.stack([7e6 * np.cos(turn), 7e6 * np.sin(turn), np.full(len(t), 5e5)], -1)
+    state = np.array([3.9e11, 0.8e11, 0.3e11]), np.array([-4e3, 1.75e4, 3e3])
+    tau = np.zeros(len(t))
+    for _ in range(10):
+        line = pz.propagate_kepler(*state, earth.constants.GM["sun"], t - tau)[0] - centre - places
+        tau = np.linalg.norm(line, axis=1) / 299792458.0
+    sigma = np.radians(1.0 / 3600.0)
+    second = np.arctan2(line[:, 2], np.hypot(line[:, 0], line[:, 1]))
+    first = np.arctan2(line[:, 1], line[:, 0]) % (2 * np.pi) + sigma * rng.standard_normal(len(t)) / np.cos(second)
+    second = second + sigma * rng.standard_normal(len(t))
+    seen = Observations(
+        epoch=EPOCH, t=np.tile(t, 2), value=np.r_[first, second], kinds=("right_ascension", "declination"),
+        kind=np.repeat([0, 1], len(t)), participants=("C51", "AST"), station=0, object=1, sigma=sigma, tag=3, places=places,
+        segments=(Segment("UTC", angles="astrometric", frame="GCRF"),), place=np.tile(turn, 2),
+        extra={"place_axes": np.full(2 * len(t), "GCRF")},
+    )  # fmt: skip
+    found = pz.determine(seen, forces="none", epoch=EPOCH)
+    assert found.determined and found.setup.measured.about == "sun"
+    k = found.setup.solution
+    error, P = found.estimate.mean[k] - np.concatenate(state), found.estimate.covariance[k]
+    scale = np.sqrt(np.diag(P))
+    assert error / scale @ np.linalg.solve(P / np.outer(scale, scale), error / scale) < quantile(0.9999, 6)

@@ -20,6 +20,7 @@ NEAR = earth.Station.geodetic("Near", np.radians(-33.0), np.radians(118.0), 100.
 SITES = (YARRAGADEE, NEAR)
 TIMES = T + np.arange(0.0, 301.0, 20.0)
 GM = 3.986004418e14
+NEAR_BY = 0.1  # of it between satellites: 300 m across a range of 300 km make 0.15 m, more than its noise
 SPREAD = [300.0] * 3 + [0.3] * 3  # m, m/s of the prior, of which truths are drawn
 
 
@@ -95,7 +96,7 @@ def problem_of(name):
     priors = {n: pz.Gaussian(mean, spread**2) for n, (mean, spread) in dict(made.priors).items()}
     priors |= {n: pz.Gaussian(0.0, PRIORS[n] ** 2) for n in made.parameters if n in PRIORS}
     functions = {**FORCES.functions(EPOCH), **made.functions(EPOCH)}
-    near = 0.1 if name == "range, aboard" else 1.0  # of a range of 300 km 300 m across make 0.15 m: beyond its noise
+    near = NEAR_BY if name == "range, aboard" else 1.0
     prior = pz.Gaussian(orbit("LEO"), np.square(near * np.array(SPREAD)))
     return pz.Problem(
         FORCES.model([made]), prior, None, stations, {**FORCES.values, **priors}, pz.RungeKutta8(20.0), prior_time=T,
@@ -109,8 +110,9 @@ def _both():
     model = sensors.two_satellites(FORCES, [own, between])
     x = np.r_[orbit("LEO"), orbit("LEO") + np.array([2e5, 1e5, -2e5, 20.0, -30.0, 10.0])]
     stations = [pz.Station(**own.at(site, EPOCH, 1.0)) for site in SITES] + [pz.Station(**between.at(sigma=0.1))]
+    prior = pz.Gaussian(x, np.square(NEAR_BY * np.array(SPREAD * 2)))
     return pz.Problem(
-        model, pz.Gaussian(x, np.square(SPREAD * 2)), None, stations, FORCES.values, pz.RungeKutta8(20.0), prior_time=T,
+        model, prior, None, stations, FORCES.values, pz.RungeKutta8(20.0), prior_time=T,
         functions=FORCES.functions(EPOCH), epoch=EPOCH,
     )  # fmt: skip
 

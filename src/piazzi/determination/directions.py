@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -22,6 +23,16 @@ GEOCENTRE = "500"  # of the Minor Planet Center: reduced to the centre of the Ea
 AZEL, RADEC = ("azimuth", "elevation"), ("right_ascension", "declination")
 XEYN, XSYE = ("x_east", "y_north"), ("x_south", "y_east")
 MOUNTS = {"azel": AZEL, "xeyn": XEYN, "xsye": XSYE}  # as `sensors.azimuth_elevation` calls them
+
+
+@dataclass(frozen=True, eq=False)
+class Standing(Table):
+    """A place as a table, of an orbit about `about`."""
+
+    about: str = "earth"
+
+    def __getstate__(self) -> dict[str, Any]:
+        return super().__getstate__() | {"about": self.about}
 
 
 def mounts(context: Context, index: Array) -> Sequence[Part]:
@@ -87,7 +98,7 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
     )
 
 
-def _about_its_row(context: Context, row: int, angles: str | None) -> Table:
+def _about_its_row(context: Context, row: int, angles: str | None) -> Standing:
     """Where an observer that moves is when it measures a row; on the Earth it turns with it, in space it stands still.
 
     Raises
@@ -107,7 +118,7 @@ def _about_its_row(context: Context, row: int, angles: str | None) -> Table:
         place, velocity = body("earth", dates, "sun")
         r, v = r + place, v + velocity
     t = observations.t[row] + (observations.epoch - context.epoch)
-    return Table(t + np.array(SHIFTS), np.hstack([r, v]))
+    return Standing(t + np.array(SHIFTS), np.hstack([r, v]), about=context.about)
 
 
 def paired(context: Context, index: Array, kinds: tuple[str, ...]) -> Array:
