@@ -59,7 +59,11 @@ def determine(run, text, *words):
         ),
         ("time,station,range\n2020-01-01T00:00:00Z,DSS,7000\n", ("--sigma", "1m"), '--columns "range=range[m]"'),
         ("time,station,azimuth [h]\n2020-01-01T00:00:00Z,DSS,7\n", (), "hours of right ascension are 15 deg each"),
-        (message(segment("RECEIVE_FREQ_1 = 2020-01-01T00:00:00 4e8\n")), ("--sigma", "1Hz"), "frequencies of two-way signals"),
+        (
+            message(segment("RECEIVE_FREQ_1 = 2020-01-01T00:00:00 4e8\n")),
+            ("--sigma", "1Hz"),
+            "does not say which frequency was sent (TRANSMIT_FREQ)",
+        ),
         (message(segment("RECEIVE_FREQ_3 = 2020-01-01T00:00:00 4e8\n")), ("--sigma", "1Hz"), "RECEIVE_FREQ_3"),
         (message(segment(UNITS, extra="RANGE_UNITS = RU\n")), ("--range", "two-way"), "--range-unit 0.28m"),
         (

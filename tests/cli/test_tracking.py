@@ -112,7 +112,7 @@ def test_every_format_is_shown(call, data_dir, name):
         (["--to", "no/such/folder/a.csv"], "there is no folder"),
         (["--to", "a.oem"], "the file holds measurements, no orbit"),
         (["--range", "twoway"], "did you mean 'two-way'"),
-        (["--interval", "long"], "'long' is not a valid number"),
+        (["--interval", "long"], "--interval is 'long'; write a length of time"),
         (["--sigma", "range=1s"], "sigma 'range=1s'"),
         (["--time", "SAT=GPS"], "TIME_SYSTEM is UTC, and GPS was said for SAT"),
         (["--with", "ekf"], "--with"),

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import click
 
-from piazzi.cli.options import F, duration
+from piazzi.cli.options import F
 
 _OPTIONS: tuple[tuple[str, str, str, bool], ...] = (
     ("range", "WAY", "What ranges are: one-way, two-way (half of the way there and back), round-trip or three-way.", False),
@@ -37,10 +37,12 @@ def conventions(function: F) -> F:
 
 
 def told(options: dict[str, Any]) -> dict[str, Any]:
-    """The words that were given, by the names that `read_tracking` takes; raises click.BadParameter for no length of time."""
+    """The words that were given, by the names that `read_tracking` takes; raises ValueError for no length of time."""
     found = {name: value for name, value in options.items() if value not in (None, ())}
     if "interval" in found:
-        found["interval"] = duration(found["interval"])
+        from piazzi.units import positive_duration
+
+        found["interval"] = positive_duration(found["interval"], "--interval")
     return found
 
 

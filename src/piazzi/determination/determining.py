@@ -28,12 +28,12 @@ from piazzi.determination.holding import NONE, Held, held, unasked
 from piazzi.determination.initial import initial_orbits
 from piazzi.determination.initial_result import InitialOrbits
 from piazzi.determination.instruments import with_instruments
-from piazzi.determination.orbit_forces import Chosen, chosen_forces
+from piazzi.determination.orbit_forces import Chosen, chosen_forces, orientation_of
 from piazzi.determination.partners import Partner, partners_of, with_partners
 from piazzi.determination.products import check_writable
 from piazzi.determination.pseudoranges import positions
 from piazzi.determination.result import Determination
-from piazzi.determination.sensing import Measured, measured, of_object
+from piazzi.determination.sensing import Measured, measured, of_object, oriented
 from piazzi.determination.setup import Setup, at_last_used, posed, setup
 from piazzi.determination.sun_forces import forces_about_the_sun
 from piazzi.determination.unguided import first_look, goes_about_the_sun, unguided
@@ -176,6 +176,7 @@ def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[[Guess], 
     rows = of_object(with_partners(observations_of(files, case.answers), partners), case.object)
     rows, earlier = _beside_prior(rows, case)
     seen, begin = _seen(rows, case, earlier, any(one.what.kind == CLOCK for one in wanted), partners)
+    seen = oriented(seen, orientation_of(case.forces))
     seen = with_instruments(seen, [one for one in wanted if one.what.kind in INSTRUMENTS])
 
     def chosen(orbit: Guess) -> Chosen:

@@ -18,10 +18,10 @@ from piazzi.determination.fit import estimators
 from piazzi.determination.guesses import Guess
 from piazzi.determination.initial_result import UndeterminedError
 from piazzi.determination.live import Live, Taken
-from piazzi.determination.orbit_forces import Chosen
+from piazzi.determination.orbit_forces import Chosen, orientation_of
 from piazzi.determination.partners import partners_of, with_partners
 from piazzi.determination.result import Determination
-from piazzi.determination.sensing import Measured, measured, of_object
+from piazzi.determination.sensing import Measured, measured, of_object, oriented
 from piazzi.determination.setup import Setup, posed, setup
 from piazzi.determination.sites import sites_of
 from piazzi.determination.unguided import unguided
@@ -195,6 +195,7 @@ class Following:
             clocks=any(one.what.kind == CLOCK for one in self._unknowns), name=case.object or first.object or None,
             about=first.about, antenna=case.antenna, epoch=first.epoch, partners=self._partners,
         )  # fmt: skip
+        seen = oriented(seen, orientation_of(case.forces))
         return self._live.with_constants(seen) if self._live else seen
 
     # ---- the answer ----------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ from piazzi.earth import ForceChoice, Forces, LaserSphere, laser_sphere, read_fo
 from piazzi.earth.defaults import AIR_BELOW, lowest_height
 from piazzi.earth.force_air import air
 from piazzi.earth.force_options import CONSTANT
+from piazzi.earth.scales import Orientation
 from piazzi.earth.stepping import longest_step
 from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
@@ -102,6 +104,17 @@ def chosen_forces(
         left_out["drag"] = "there is air at this height, and no drag among the forces"
     step = longest_step(state[:3], state[3:6], STEPS)
     return Chosen(choice, roles, values, facts, step, left_out, assumed, air_varies=varies)
+
+
+def orientation_of(given: Any) -> Orientation | None:
+    """The orientation of the Earth that forces say, which is that of the stations too; None where they say none."""
+    if isinstance(given, ForceChoice):
+        return given.eop
+    if given is None or isinstance(given, Forces):
+        return None
+    with suppress(ValueError, OSError):  # who makes the forces tells of it
+        return read_forces(str(given), AIR_BELOW).eop
+    return None
 
 
 def air_varies(height: float, weather: bool) -> AirVaries:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.partners import partners_of, with_partners
-from piazzi.determination.sensing import Measured, measured, of_object
+from piazzi.determination.sensing import Measured, measured, of_object, oriented
 from piazzi.earth import Epoch
 from piazzi.estimate.prior import with_prior_at
 from piazzi.formats import read_tracking
@@ -61,6 +61,7 @@ def recorded(path: str | os.PathLike[str], scenario: str | os.PathLike[str], sai
     read = None if faults else read_scenario(_with_measurements(tables, found, os.fspath(path)), name, faults)
     if read is None:
         raise ScenarioError(os.fspath(scenario), list(faults))
+    found = oriented(found, getattr(read.problem.functions.get("fixed"), "eop", None))
     problem = _measuring(read.problem, found)
     tracking = found.tracking
     first = float(tracking.times[0])

@@ -23,6 +23,7 @@ from piazzi.determination.rates import rates
 from piazzi.determination.sites import Context, sites_of, with_station_sigmas
 from piazzi.determination.unknowns import Label
 from piazzi.earth import Epoch
+from piazzi.earth.scales import Orientation
 from piazzi.formats import KINDS, Observations
 from piazzi.model import Sensor
 from piazzi.problem import Station, Tracking
@@ -176,6 +177,18 @@ def measured(
         tuple(dict.fromkeys([*said, *(text for part in parts for text in part.assumed)])),
         left_out, about=about,
     )  # fmt: skip
+
+
+def oriented(seen: Measured, eop: Orientation | None) -> Measured:
+    """What was measured from an Earth that is oriented so, as the forces have it; as it is for None."""
+    if eop is None:
+        return seen
+
+    def turned(data: Any) -> Any:
+        return replace(data, eop=eop) if hasattr(data, "eop") else data
+
+    stations = tuple(replace(station, place=turned(station.place)) for station in seen.stations)
+    return replace(seen, stations=stations, functions={name: turned(data) for name, data in seen.functions.items()})
 
 
 def _silent(observations: Observations) -> dict[str, int]:

@@ -100,8 +100,9 @@ def _lost(estimate: Estimate, truth: Array | None) -> tuple[float, str]:
     if truth is not None and truth.shape == estimate.mean.shape:
         found["errors"] = (estimate.mean - truth, P)
     for what, (off, variance) in found.items():
-        there = ~np.isnan(off) & (variance > 0)
-        typical = float(np.median(off[there] ** 2 / variance[there])) if there.any() else 0.0
+        there = np.isfinite(off) & np.isfinite(variance) & (variance > 0)
+        with np.errstate(over="ignore"):
+            typical = float(np.median((off[there] / np.sqrt(variance[there])) ** 2)) if there.any() else 0.0
         if typical > LOST:
             return typical**0.5, f"half of its {what} are beyond {typical**0.5:.2g} sigma"
     return 0.0, ""
