@@ -1,6 +1,7 @@
 """Real tracking with the scenarios of the documentation, by five estimators, against what others determined."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,22 @@ def test_lasers_to_lageos_2(data_dir, tmp_path):
         path = follow(problem, times, moved(problem, state, t, times[0]), 60.0)[0]
         assert np.sqrt(np.mean(np.sum((path[:, :3] - there) ** 2, axis=1))) < 0.5, name
         assert all(left < 0.06 for left in residual_rms(found).values()), name
+
+
+def test_a_wide_prior_does_not_round_the_graph_s_steps(data_dir, tmp_path):
+    """Covariances that hold 3 cm below 100 km round steps to tenths of a sigma, of which none lowers the cost."""
+    folder = data_dir / "earth" / "lageos2"
+    stations = [str(folder / name) for name in ("SLRF2014_POS+VEL_2030.0_200428.snx", "ecc_une.snx")]
+    scenario = tmp_path / "lageos2-lasers.toml"
+    written(tmp_path, scenario.name)
+    scenario.write_text(re.sub(r"stations = .*", f"stations = {stations}", scenario.read_text()))
+    problem, tracking = pz.load(folder / "lageos2_20160214.npt", scenario=scenario)
+    sigma = np.repeat([200.0, 0.2], 3)
+    problem = replace(problem, prior=pz.Gaussian(problem.prior.mean + sigma, np.diag(sigma**2)))
+    found, batch = pz.FactorGraph().estimate(problem, tracking), pz.BatchLeastSquares().estimate(problem, tracking)
+    assert found.success and batch.success, (found.message, batch.message)
+    apart = (found.mean[-1] - batch.mean[-1]) / np.sqrt(np.diag(batch.covariance[-1]))
+    assert np.abs(apart).max() < 0.01
 
 
 def test_a_radar_and_geos_3(data_dir, tmp_path):

@@ -17,6 +17,8 @@ from piazzi.determination import Guess
 from piazzi.determination.case import Case
 from piazzi.determination.determining import prepared, ready, solved
 from piazzi.determination.fit import estimators
+from piazzi.determination.orbit_forces import AirVaries
+from piazzi.determination.physical import share_of, value_of
 from piazzi.determination.setup import follow
 from piazzi.earth.tabulated import Place
 from piazzi.estimate.chi_square import quantile
@@ -158,16 +160,20 @@ AIR = Kind(
 )  # fmt: skip
 PROCESS = replace(AIR, estimate="cd=0.5 cd~24h=0.32")
 PIECE = 3600.0  # s, in which the density of a truth keeps to its share
+LEAST = 0.05  # of the density of the model, that there is always
 
 
 def flown(given, first, times, share):
-    """States (K, n) of an orbit to whose coefficient of drag a share of the usual one is added, another in each hour."""
+    """States (K, n) of an orbit through air whose density departs from its model by a share, another in each hour.
+
+    Density multiplies the coefficient of drag, whatever that is: the share is of the object's own, not of the usual one.
+    """
     place = given.problem.model.names.index("cd_a_m_share")
-    out, x, t, mean = [], first.copy(), float(times[0]), first[place]
+    out, x, t, own = [], first.copy(), float(times[0]), value_of(first[place])
     for k, part in enumerate(share):
         end = min(PIECE * (k + 1), float(times[-1]))
         inside = times[(times > t) & (times <= end)]
-        x[place] = mean + part
+        x[place] = share_of(own * max(1.0 + part, LEAST))
         nodes = np.unique(np.concatenate([[t], inside, [end]]))
         states = follow(given.problem, nodes, x, given.chosen.max_step)[0]
         out.append(states[np.isin(nodes, inside if k else np.concatenate([times[:1], inside]))])
@@ -181,7 +187,7 @@ def predictions(kind, count, other=None, days=(1, 2, 3), first=0):
     """NEES per axis R, T, N (count, days, 3) of predictions, where the density of the truth varies, or is another model's."""
     given = begun(kind)
     truth = given if other is None else begun(other)
-    names = truth.problem.model.names
+    names, law = truth.problem.model.names, given.chosen.air_varies or AirVaries(0.32, 86400.0)
     rows, last = given.tracking.times, float(given.tracking.times[-1])
     ahead = np.array([last + 86400.0 * day for day in days])
     times = np.concatenate([rows, ahead])
@@ -189,10 +195,10 @@ def predictions(kind, count, other=None, days=(1, 2, 3), first=0):
     for seed in range(first, first + count):
         rng = np.random.default_rng(seed)
         hours = int(times[-1] // PIECE) + 2
-        share, left = np.zeros(hours), np.exp(-PIECE / 86400.0)
-        share[0] = 0.32 * rng.standard_normal()
+        share, left = np.zeros(hours), np.exp(-PIECE / law.time)
+        share[0] = law.sigma * rng.standard_normal()
         for k in range(1, hours):
-            share[k] = left * share[k - 1] + 0.32 * np.sqrt(1 - left**2) * rng.standard_normal()
+            share[k] = left * share[k - 1] + law.sigma * np.sqrt(1 - left**2) * rng.standard_normal()
         start = truth.states[0].copy()
         start[:6] += np.repeat(kind.off, 3) * rng.standard_normal(6)
         start[names.index("cd_a_m_share")] = 1.0 + 0.3 * rng.standard_normal()

@@ -21,7 +21,7 @@ from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.losses import Cauchy, loss_of
 from piazzi.estimate.robust import RobustChain, chain_for, gated_run, minimize, solve_at
 from piazzi.estimate.sliding_window import SlidingWindow
-from piazzi.estimate.width import DIFFUSE, NOT_BORDERED, TOO_WIDE, undetermined
+from piazzi.estimate.width import DIFFUSE, NOT_BORDERED, ROUNDED, TOO_WIDE, undetermined
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.inputs import Inputs, prepare, with_prior_node
@@ -167,8 +167,9 @@ class FactorGraph:
         """Optimise from the start asked for; the outcome, its solver, and the starts used.
 
         Where the iterations fail, once more from a window, then from the prior.  Where the prior turns out too wide for a
-        filter, in bordered form and from the prior first.  Where the filter behind the start was wrong about its errors, from
-        the prior too: it may have led to another solution of the same measurements.
+        filter, in bordered form and from the prior first; where it was only so wide that rounding may be why every start
+        failed, in that form too.  Where the filter behind the start was wrong about its errors, from the prior too: it may have
+        led to another solution of the same measurements.
         """
         problem, name = chain.problem, self.start if isinstance(self.start, str) else "given"
         name = name if self._bank is None or isinstance(self.start, Paths) else "ekf"
@@ -200,6 +201,8 @@ class FactorGraph:
                     return _too_wide(outcome, self.solver), solver, start
                 solver, wide, tried = solver if bordered else BorderedSolver(chain), True, []
                 waiting = [*(["given"] if name == "given" else []), "prior", "window"]
+            elif outcome.failure and not waiting and not wide and applies and self._rounds(solver):
+                solver, wide, waiting = BorderedSolver(chain), True, [*(["given"] if name == "given" else []), "prior"]
         outcome, used = _together(tried), ", then ".join(start for start, _ in tried)
         used = used.replace("given", "orbits") if isinstance(self.start, Paths) else used
         for start in self._others(chain, doubtful, tried[-1][0]) if not outcome.failure else ():
@@ -207,6 +210,10 @@ class FactorGraph:
             outcome, better = self._or_better(chain, solver, outcome, with_first(chain, states))
             used = start if better else used
         return outcome, solver, used
+
+    def _rounds(self, solver: Solver) -> bool:
+        """Whether steps by covariances that failed may have done so for their rounding."""
+        return self.solver == "auto" and isinstance(solver, CovarianceSolver) and solver.widest() > ROUNDED
 
     def _others(self, chain: Chain, doubtful: bool, used: str) -> Iterator[str]:
         """Where else to begin, for as long as the solution may not be the best."""

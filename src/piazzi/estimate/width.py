@@ -18,6 +18,7 @@ from piazzi.problem.inputs import Inputs
 
 # predicted over noise variance of one measurement beyond which a covariance keeps less than six digits of what is left
 DIFFUSE = 1e10
+ROUNDED = 1e6  # and beyond which what is left may be too coarse for the last steps of a graph
 TOO_WIDE = "the prior is too wide for covariances"
 WIDE = 1e6  # times the size of a value: a prior that wide says that it is not known
 UNINFORMED = 0.9  # of the prior's variance: the measurements said nothing
