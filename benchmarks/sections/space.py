@@ -14,6 +14,8 @@ from floor.space import build, vector_table_seconds
 
 import piazzi as pz
 from piazzi.earth import tabulated
+from piazzi.kernels.generate import model_source
+from piazzi.model.derivation import derive, derive_sensor
 from piazzi.problem import outside
 
 DEGREES = (2, 8, 20, 70)
@@ -64,6 +66,7 @@ def figures() -> Iterator[Figure]:
     yield from _days()
     yield from _less_gradient()
     yield from _nodes()
+    yield _derivation()
 
 
 def _beside(ours: Callable[[], float], theirs: Callable[[], float], rounds: int = ROUNDS) -> tuple[float, float]:
@@ -189,3 +192,17 @@ def _nodes() -> Iterator[Figure]:
         run = _timed(make, 1)
         value = statistics.median(run() for _ in range(3))
         yield Figure(f"tables for {name}", value * 1e3, "ms", bound=bound * 1e3)
+
+
+def _derivation() -> Figure:
+    """Partials and source of the equations of an orbit, nothing known before."""
+    model = orbits.problem(20, True).model
+
+    def made() -> None:
+        derive.__wrapped__(model)
+        for sensor in model.sensors:
+            derive_sensor.__wrapped__(model, sensor)
+        model_source(model, pz.RungeKutta4(1).scheme, 1)
+
+    run = _timed(made, 1)
+    return Figure("equations derived, and their source", statistics.median(run() for _ in range(5)), "s", bound=2.0)

@@ -1,5 +1,7 @@
 """Orbits about the Sun from directions: sensors by their laws, and Ceres as Piazzi saw it against JPL's orbit of today."""
 
+import tomllib
+
 import erfa
 import numpy as np
 import pytest
@@ -12,9 +14,11 @@ from piazzi.determination.case_file import CASES, split
 from piazzi.determination.centres import EARTH, SUN
 from piazzi.determination.guesses import Guess
 from piazzi.determination.orbit import ECLIPTIC, Orbit
+from piazzi.determination.published import published_of
 from piazzi.determination.unguided import goes_about_the_sun
 from piazzi.formats import Observations, Segment, read_tracking
 from piazzi.orbit import propagate_kepler
+from piazzi.scenarios.toml_text import toml_text
 
 LIGHT, AU = 299792458.0, 149597870700.0
 EPOCH = pz.Epoch("2015-03-01T00:00:00 TDB")
@@ -248,6 +252,12 @@ def test_published_orbits_are_read_as_they_were_meant(data_dir, who, arcseconds)
         there = truth(epoch)
         off = np.linalg.norm(one.state(epoch, "sun")[:3] - there[:3]) / np.linalg.norm(there[:3])
         assert np.degrees(off) * 3600 < arcseconds
+
+
+@pytest.mark.parametrize("who", [0, 1])
+def test_a_published_orbit_is_written_as_it_was_read(who):
+    one = split(["ceres-1801"])[1].published[who]
+    assert published_of(tomllib.loads(toml_text({"published": [one.table()]}))["published"][0], "again") == one
 
 
 def test_a_published_orbit_that_lacks_something_is_refused(tmp_path):

@@ -3,7 +3,6 @@
 Every estimator runs on it, and they agree as their laws say; what it costs to derive.
 """
 
-import time
 from dataclasses import replace
 from functools import cache
 
@@ -14,7 +13,6 @@ from numpy.testing import assert_allclose
 import piazzi as pz
 from piazzi.earth.gravity import Gravity
 from piazzi.kernels.generate import model_source
-from piazzi.model.derivation import derive, derive_sensor
 from piazzi.model.functions import Signature
 from piazzi.outside.table import Table
 from piazzi.study.ensemble import Layout, filter_runs, simulate_runs
@@ -294,15 +292,7 @@ def test_a_study_runs_on_it(tmp_path):
     assert all(found.row(0, row).success.all() for row in range(len(found.rows)))
 
 
-def test_it_is_derived_in_two_seconds_and_its_source_grows_with_its_definitions():
-    model = satellite().model
-    started = time.process_time()
-    derive.__wrapped__(model)
-    for sensor in model.sensors:
-        derive_sensor.__wrapped__(model, sensor)
-    model_source(model, pz.RungeKutta4(1).scheme, 1)
-    assert time.process_time() - started < 2.0
-
+def test_its_source_grows_with_its_definitions():
     def length(bodies):
         out = {"far": "x"} | {k: v for b in range(bodies) for k, v in third(f"body{b}", 1e20).items()}
         rates = [" + ".join(["far", *(f"body{b}a{a}" for b in range(bodies))]) for a in "xyz"]

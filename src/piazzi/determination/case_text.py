@@ -52,7 +52,8 @@ def case_tables(case: Case, given: Setup, folder: Path) -> dict[str, Any]:
         else:
             told[name.rstrip("_")] = plain
     told |= {name: _plain(name, value, None) for name, value in filled.answers.items()}
-    return {"determine": told, **{name: section for name, section in sections.items() if section}}
+    printed = {"published": [one.table() for one in case.published]} if case.published else {}
+    return {"determine": told, **{name: section for name, section in sections.items() if section}, **printed}
 
 
 def _filled(case: Case, given: Setup) -> Case:

@@ -34,6 +34,7 @@ SMALL = 0.1  # of a sigma, by which drag may move the solution before the densit
 PARTS = 20.0  # of the process's time behind the measurements, in each of which it is constant
 WAVES = ("cos", "sin")
 NAMES = {"cos": "cosine", "sin": "sine"}
+BEHIND = np.geomspace(0.3, 30.0, 400)  # times what was found, that a coefficient may be
 LEAST = 0.1  # of the usual coefficient, which shares are of at the least
 
 
@@ -49,7 +50,9 @@ def with_density(given: Setup) -> Setup:
     moved = analysed(given, given.states).rows[..., names.index(DRAG)]
     if not (last > first and np.linalg.norm(np.nan_to_num(moved)) > SMALL):
         return given
-    chosen = _with_process(_about(given), given.measured.epoch, varies, first, (last - first) / (COUNT - 1))
+    chosen = _with_process(
+        _about(given, varies, last - first), given.measured.epoch, varies, first, (last - first) / (COUNT - 1)
+    )
     text = f"the density over the measurements is estimated at {COUNT} times, as drag moves the orbit"
     found = renewed(given, given.measured, chosen)
     place = found.problem.model.names.index(DRAG)
@@ -63,11 +66,22 @@ def _coefficient(given: Setup) -> float:
     return float(given.problem.parameters[said_name(DRAG)]) * float(value_of(share))
 
 
-def _about(given: Setup) -> Chosen:
-    """The forces with what was found for the usual coefficient, so that shares of the density are of that."""
+def _about(given: Setup, varies: AirVaries, span: float) -> Chosen:
+    """The forces with the usual coefficient that shares of the density are of: that which may stand behind what was found.
+
+    The measurements tell the product of coefficient and density.  Where the density was low over them, what was found is less
+    than the coefficient, of which the density varies by its shares later: its root mean square given what was found, by the
+    belief in the coefficient before and the variance of the mean of a Gauss-Markov process over the measurements.
+    """
     chosen, name = given.chosen, said_name(DRAG)
     old, before = float(chosen.values[name]), chosen.values[DRAG]
-    new = max(_coefficient(given), LEAST * old)
+    found, spread = max(_coefficient(given), LEAST * old), sqrt(float(np.ravel(before.covariance)[0]))
+    turns = span / varies.time
+    share = varies.sigma * sqrt(2.0 * (exp(-turns) - 1.0 + turns)) / turns
+    tried = found * BEHIND
+    off = ((found / tried - 1.0) / share) ** 2 + ((tried / old - 1.0) / spread) ** 2
+    weight = np.exp(-0.5 * (off - off.min()))
+    new = sqrt(float(weight @ tried**2 / weight.sum()))
     scaled = Gaussian(share_of(old / new), float(np.ravel(before.covariance)[0]) * (old / new) ** 2)
     return replace(chosen, values={**chosen.values, name: new, DRAG: scaled})
 

@@ -15,6 +15,7 @@ from piazzi.orbit import Keplerian, propagate_kepler
 from piazzi.problem.checks import Array
 
 KEYS = ("name", "date", "source", "epoch", "axes", "a", "e", "i", "node", "perihelion", "longitude")
+ANGLES = ("i", "node", "perihelion", "longitude")
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,22 @@ class Published:
     node: float
     perihelion: float
     longitude: float
+
+    def table(self) -> dict[str, Any]:
+        """What `published_of` reads: `a` in astronomical units, angles in degrees."""
+        from piazzi.earth.constants import ASTRONOMICAL_UNIT
+
+        angles = {key: np.degrees(getattr(self, key)) for key in ANGLES}
+        numbers = {"a": self.a / ASTRONOMICAL_UNIT, "e": self.e, **angles}
+        printed = {key: float(f"{value:.15g}") for key, value in numbers.items()}  # as it was before its change of units
+        return {
+            "name": self.name,
+            "date": self.date,
+            "source": self.source,
+            "epoch": self.epoch.exact(),
+            "axes": self.axes,
+            **printed,
+        }
 
     def state(self, epoch: Epoch, about: str) -> Array:
         """Position and velocity (6,) at a date, on the axes of the ICRF."""
@@ -70,7 +87,7 @@ def published_of(table: Any, where: str) -> Published:
     axes = ("ecliptic of date", ECLIPTIC)
     if table["axes"] not in axes:
         raise ValueError(f"{where}: axes are {' or '.join(axes)}, not {str(table['axes'])[:40]!r}")
-    angles = {key: float(np.radians(float(table[key]))) for key in ("i", "node", "perihelion", "longitude")}
+    angles = {key: float(np.radians(float(table[key]))) for key in ANGLES}
     texts: Any = {key: str(table[key]) for key in ("name", "date", "source", "axes")}
     numbers: Any = {**angles, "a": float(table["a"]) * ASTRONOMICAL_UNIT, "e": float(table["e"])}
     return Published(epoch=Epoch(table["epoch"]), **texts, **numbers)
