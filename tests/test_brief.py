@@ -8,6 +8,7 @@ import pytest
 
 import piazzi as pz
 from piazzi import earth, formats, orbit
+from piazzi.scenarios import load_scenario
 from piazzi.text import brief, spelled
 
 MOST = 500
@@ -62,7 +63,7 @@ def test_files_that_were_read_are_short(tmp_path):
 
 def test_what_kernels_are_named_by_is_spelled_in_full():
     """A name that left anything out would give one model the code of another."""
-    model = pz.load("leo-radar")[0].model
+    model = load_scenario("leo-radar").problem.model
     text = spelled(model)
     assert len(repr(model)) <= MOST and all(len(repr(sensor)) <= MOST for sensor in model.sensors)
     for words in (*model.dynamics, *(equation for sensor in model.sensors for equation in sensor.equations)):

@@ -20,6 +20,7 @@ def two(tmp_path):
 pytestmark = pytest.mark.filterwarnings("ignore::piazzi.earth.EOPWarning")
 
 
+@pytest.mark.slow
 def test_two_directions_are_a_ridge_and_exit_3(call, two, tmp_path):
     """Four numbers of six: both commands say which, and how far away it may be; nothing is called an orbit."""
     found = call("orbits", two, "--about", "sun", "--sigma", "5arcsec", "-o", tmp_path / "o.json", "--json")

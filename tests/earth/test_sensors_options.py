@@ -111,9 +111,8 @@ def test_a_number_may_be_a_parameter_of_any_role(role):
     assert "range_scale" not in dict(sensor.defaults)
 
 
-@pytest.mark.parametrize(
-    "name", ["radar_delay", pytest.param("carrier_phase", marks=SLOW), pytest.param("pseudorange", marks=SLOW)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["radar_delay", "carrier_phase", "pseudorange"])
 def test_gravity_delays_each_leg(name):
     """2 GM/c^2 ln((r1 + r2 + rho)/(r1 + r2 - rho)) of each leg, in the unit of the sensor."""
     plain, key = made(name)

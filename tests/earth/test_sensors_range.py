@@ -24,7 +24,7 @@ def expected(p, path, tag, x, transmitter=YARRAGADEE, t=T):
 
 
 @pytest.mark.parametrize("steps", [False, True])
-@pytest.mark.parametrize("tag", [pytest.param(t, marks=[pytest.mark.slow] * (t == "transmission")) for t in light.TAGS])
+@pytest.mark.parametrize("tag", [pytest.param(t, marks=[pytest.mark.slow] * (t != "reception")) for t in light.TAGS])
 def test_range_is_that_of_light_times_by_repetition(tag, steps):
     """To 1e-6 m to geostationary orbits, 1e-5 m at the Moon; partials to 1e-7 of theirs."""
     sensor = [sensors.range(path, name=path, tag=tag, steps=steps) for path in ("one-way", "two-way")]

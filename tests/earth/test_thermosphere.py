@@ -140,6 +140,7 @@ drag = "harris-priester"
 """
 
 
+@pytest.mark.slow
 def test_a_scenario_names_its_space_weather(weather, tmp_path, monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
     path = tmp_path / "storm.toml"

@@ -39,7 +39,10 @@ def test_names_contrast_and_keys(open_page, pages, kind, scheme, width):
     check_looks(open_page(pages[kind], width=width, scheme=scheme))
 
 
-@pytest.mark.parametrize("kind", [pytest.param("comparison", marks=pytest.mark.slow), *KINDS[1:]])
+LONG = ("comparison", "study")
+
+
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind in LONG)) for kind in KINDS])
 def test_every_chart_is_kept_as_a_picture_and_as_numbers(open_page, pages, kind):
     page = open_page(pages[kind])
     page.evaluate("() => document.querySelectorAll('details').forEach((d) => (d.open = true))")

@@ -129,6 +129,7 @@ def test_stations_are_where_they_stand(ax, ekf):
     assert mark.get_label() == f"station {station.name}"
 
 
+@pytest.mark.slow
 def test_stations_of_the_earth_are_where_they_measured():
     """On its surface, by a turn of a sidereal day."""
     scenario = load_scenario("lageos2-laser")

@@ -17,7 +17,7 @@ from piazzi.determination.analysis import Analysis
 from piazzi.determination.faults import CORRELATED, DUPLICATE, OUTLIER, STATION
 from piazzi.determination.holding import labels_of, passes
 from piazzi.determination.setup import Setup, scale_of
-from piazzi.estimate.chi_square import quantile
+from piazzi.estimate.chi_square import cdf, quantile
 from piazzi.problem.checks import Array
 
 OUT, BACK = exp(-4.0), exp(0.5)  # probability beyond a chi-square of 8 with two degrees of freedom; and times that beyond 7
@@ -76,7 +76,8 @@ def _settled(given: Setup, analysis: Analysis, keep: Array, repeated: Array, the
         own = squared[keep & (degrees > 0)] / degrees[keep & (degrees > 0)]
         middle = float(np.median(own)) / 0.4549 if own.size else 1.0  # of a chi-square with one degree of freedom
         wide = min(wide, max(1.0, middle))
-        gate = _gate(squared[~repeated] / wide, degrees[~repeated])
+        usual = min(1.0, float(np.median((squared / _beyond(0.5, degrees))[keep & (degrees > 0)]))) if own.size else 1.0
+        gate = _gate(squared[~repeated] / wide, degrees[~repeated], usual)
         out, back = (_beyond(p, degrees) * wide for p in (gate, BACK * gate))
         new = np.where(keep, squared <= out, squared < back) & ~repeated
         if (new == keep).all() or there[new].sum() < given.problem.model.n + SPARE:
@@ -85,10 +86,19 @@ def _settled(given: Setup, analysis: Analysis, keep: Array, repeated: Array, the
     return keep
 
 
-def _gate(squared: Array, degrees: Array) -> float:
-    """The probability at the gate: the largest at which chance puts few of the rows beyond it there."""
-    many = np.count_nonzero(degrees)
-    return next((g for g in GATES.tolist() if np.sum(squared > _beyond(g, degrees)) * CHANCE >= many * g), float(GATES[-1]))
+def _gate(squared: Array, degrees: Array, usual: float) -> float:
+    """The probability at the gate: the largest at which chance puts few of the rows beyond it there.
+
+    Chance is of residuals as large as the `usual` ones are, in units of their sigmas squared: where sigmas are cautious, a row
+    beyond the gate is hardly there by chance.
+    """
+    sizes, counts = np.unique(degrees[degrees > 0], return_counts=True)
+    for gate in map(float, GATES):
+        edges = [quantile(1.0 - gate, int(m)) / usual for m in sizes]
+        chance = sum(n * (1.0 - cdf(edge, int(m))) for n, m, edge in zip(counts.tolist(), sizes, edges, strict=True))
+        if np.sum(squared > _beyond(gate, degrees)) * CHANCE >= chance:
+            return gate
+    return float(GATES[-1])
 
 
 def _beyond(probability: float, degrees: Array) -> Array:

@@ -98,7 +98,7 @@ def _elements(found: Any, span: Any, step: float | None) -> MeanElements:
 
 def problem_text(found: Any) -> str:
     """The whole problem with the times of its measurements, as a scenario that every command loads; and its case."""
-    problem = scheduled(found.problem, found.tracking)
+    problem = scheduled(found.problem, found.setup.measured.tracking)
     with suppress(ValueError):  # a case of objects that are known in Python only
         own = replace(found.case, output=(), report=None)  # who runs the file again asks for what is to be written
         tables_ = case_tables(own, found.setup, Path.cwd())

@@ -29,6 +29,7 @@ MOST = 48  # parts in all
 TURNS = (0.25, 1.0, 4.0)  # of the orbit, that processes are tried with
 LARGEST = 20_000_000  # numbers of the derivatives by what is tried
 SIZES = np.geomspace(1e-3, 1e4, 141)  # of what is tried, in units of its least sigma from the measurements
+LOUDEST = 10.0
 HOURS = 3600.0
 STEADY = f"--estimate '{' '.join(CONSTANT)}'"
 
@@ -70,9 +71,11 @@ def remedy(given: Setup, states: Array, analysis: Analysis, keep: Array) -> str:
 
 
 def _noise(rest: Array, free: int) -> Remedy:
-    """More noise of all measurements."""
+    """More noise of all measurements; nobody's sigmas are wrong by more than `LOUDEST` times, then it is the model that is."""
     squares = float(rest @ rest)
     share = max(squares / max(free, 1), 1.0)
+    if share > LOUDEST**2:
+        return Remedy("", 0.0)
     return Remedy(f"--sigma {share**0.5:.2g} times as large", squares * (1.0 - 1.0 / share) - free * float(np.log(share)))
 
 
