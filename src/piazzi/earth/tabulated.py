@@ -281,12 +281,16 @@ class Place(Tabulated):
 
     def pieces(self, first: float, last: float) -> Pieces:
         """Positions from the day of `first` to that of `last`, and velocities, which are their derivatives."""
-        places = super().pieces(first, last)
-        c = places.coefficients
-        powers = np.arange(self.TERMS - 1, 0, -1)[:, None] * (2.0 / self.LENGTH)
-        rates = np.concatenate([np.zeros_like(c[:, :1]), powers * c[:, :-1]], axis=1)
-        zero = np.zeros(6)
-        return Pieces(places.start, places.length, np.concatenate([c, rates], axis=2), zero, zero)
+        return with_rates(super().pieces(first, last))
+
+
+def with_rates(places: Pieces) -> Pieces:
+    """Positions and beside them velocities, which are their derivatives."""
+    c = places.coefficients
+    powers = np.arange(c.shape[1] - 1, 0, -1)[:, None] * (2.0 / places.length)
+    rates = np.concatenate([np.zeros_like(c[:, :1]), powers * c[:, :-1]], axis=1)
+    zero = np.zeros(2 * c.shape[2])
+    return Pieces(places.start, places.length, np.concatenate([c, rates], axis=2), zero, zero)
 
 
 def in_tdb(start: Epoch, epochs: list[Epoch]) -> list[Epoch]:

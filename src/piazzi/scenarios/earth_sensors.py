@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 KINDS = (
     "position", "range", "range_rate", "azimuth_elevation", "right_ascension_declination", "frequency", "radar_delay",
-    "radar_doppler",
+    "radar_doppler", "returned_frequency", "carrier_phase", "pseudorange",
 )  # fmt: skip
 DIMENSIONS = {"m": "length", "m/s": "length/time", "rad": "angle"}
 AXES = ("up", "north", "east")
 ABOUT = ("earth", "sun")
-PLACE = ("site", "place", "weather", "tides")
+PLACE = ("site", "orbit", "place", "weather", "tides")
 
 
 def read_instrument(name: str, table: Table) -> Instrument | None:
@@ -88,6 +88,8 @@ def read_place(table: Table, instrument: Instrument | None, epoch: Epoch | None)
     with table.faults.at(table.path):
         if "place" in table:
             return {}, _place_of(table.raw("place"), epoch)
+        if "orbit" in table:
+            return {}, _orbit(table, epoch)
         if "site" not in table or instrument is None:
             table.fault(given[0], "is of a station with a site, whose sensor has a kind")
             return {}, None
@@ -115,6 +117,18 @@ def read_true_place(table: Table, entry: Table, instrument: Instrument | None, e
         table.fault("moved", "is of a station with a site, whose sensor has a kind")
         return None
     return replace(place, station=place.station.moved(**off))
+
+
+def _orbit(table: Table, epoch: Epoch) -> Any:
+    """The place of a satellite that ``orbit`` says by elements at the scenario's epoch; None after a fault."""
+    from piazzi.earth import gravity_field
+    from piazzi.orbit.orbit_place import OrbitPlace
+    from piazzi.scenarios.orbit_prior import ANOMALIES, ELEMENTS, of_elements
+
+    inner, gm = table.table("orbit"), gravity_field("EGM2008").gm
+    r, v = of_elements(inner, Units(), gm)
+    inner.finish((*ELEMENTS, *ANOMALIES))
+    return None if r is None else OrbitPlace((*r.tolist(), *v.tolist()), epoch, gm)
 
 
 def _site(table: Table) -> Any:
@@ -152,12 +166,15 @@ def _weather(table: Table) -> Any:
 def write_place(place: Any) -> dict[str, Any]:
     """The table that `read_place` reads back; raises ValueError for a place that files cannot hold."""
     from piazzi.earth.tabulated import Place
+    from piazzi.orbit.orbit_place import OrbitPlace
     from piazzi.outside.table import Table as Samples
     from piazzi.scenarios.earth_functions import written_orientation
     from piazzi.scenarios.functions import write_function
 
     if isinstance(place, Samples):
         return write_function(place)
+    if isinstance(place, OrbitPlace):
+        return {"kind": "orbit", "state": list(place.state), "gm": place.gm}
     if not isinstance(place, Place):
         raise ValueError(f"place {type(place).__name__} cannot be written to a file: it is known in Python only")
     station = place.station
@@ -182,10 +199,13 @@ def _place_of(given: Any, epoch: Epoch) -> Any:
     from piazzi.earth import Coordinates, Eccentricity, Place, Station
     from piazzi.earth import Epoch as Instant
     from piazzi.earth.defaults import read_data
+    from piazzi.orbit.orbit_place import OrbitPlace
     from piazzi.outside.table import Table as Samples
 
     if not isinstance(given, Mapping):
         raise ValueError(f"place is {shown(given)}; it must be a table")
+    if given.get("kind") == "orbit":
+        return OrbitPlace(tuple(map(float, given["state"])), epoch, float(given["gm"]))
     if given.get("kind") == "table":
         return Samples(given["times"], given["values"], given.get("error"), given["terms"])
 

@@ -42,7 +42,7 @@ def read_orbit(
         table.fault("time", "must be a number where the prior is an orbit")
         return None, None, None
     if any(key in table for key in (*ELEMENTS, *ANOMALIES)):
-        r, v = _of_elements(table, physics, units)
+        r, v = of_elements(table, units, physics.forces.forces.field.gm)
     else:
         state = table.vector("mean", physics.states)
         if state is None:
@@ -58,8 +58,8 @@ def read_orbit(
     return None, None, time
 
 
-def _of_elements(table: Table, physics: Physics, units: Units) -> tuple[Any, Any]:
-    """Position and velocity, (None, None) after a fault."""
+def of_elements(table: Table, units: Units, gm: float) -> tuple[Any, Any]:
+    """Position and velocity of elements, (None, None) after a fault."""
     from piazzi.orbit import Keplerian
 
     found = [key for key in ANOMALIES if key in table]
@@ -75,9 +75,8 @@ def _of_elements(table: Table, physics: Physics, units: Units) -> tuple[Any, Any
             table.fault(key, "is missing: an orbit has a, e, i, raan, argp and one of nu, E, M")
     if len(found) != 1 or None in values:
         return None, None
-    assert physics.forces is not None
     with table.faults.at(table.path):
-        return Keplerian(anomaly=ANOMALIES[found[0]]).to_state(np.array(values), physics.forces.forces.field.gm)
+        return Keplerian(anomaly=ANOMALIES[found[0]]).to_state(np.array(values), gm)
     return None, None
 
 

@@ -25,6 +25,7 @@ def pseudorange(
     relativity: bool = False,
     biases: Mapping[str, str] | Sequence[str] = (),
     parameters: Mapping[str, str] | Sequence[str] = ("clock", "clock_rate"),
+    visible: Sequence[str] = ("clear",),
 ) -> Instrument:
     """A sensor of the pseudorange (m) that a receiver on the satellite measures to a navigation satellite.
 
@@ -38,6 +39,7 @@ def pseudorange(
     name : of the sensor
     relativity : whether the gravity of the Earth delays the signal (Shapiro)
     biases, parameters : as `range` takes them
+    visible : rules of when it is measured in simulations: ``"clear"`` of the Earth between the two
     """
     ray = ray_of("one-way", "reception", relativity=relativity, aboard=True)
     ray.numbers |= dict.fromkeys(("clock", "clock_rate", "emitter_clock", "emitter_clock_rate"), 0.0)
@@ -47,7 +49,7 @@ def pseudorange(
     asked = {*parameters} & {*priors}
     units = {key: unit for key, unit in (("clock", "m"), ("clock_rate", "m/s")) if key in asked}
     return ray.instrument(
-        name, {"pseudorange": value}, parameters, units={"pseudorange": "m"}, number_units=units, priors=priors
+        name, {"pseudorange": value}, parameters, visible, units={"pseudorange": "m"}, number_units=units, priors=priors
     )
 
 

@@ -50,7 +50,8 @@ def range(  # noqa: A001
     aboard : whether the satellite itself receives, what a station (whose place may be the orbit of another satellite) sends,
         or returns on two ways; times of rows are those of reception
     visible : when stations measure in simulation: "above" their ``mask`` (rad), "dark", with the Sun below their ``night``
-        (rad, default -12 degrees), "sunlit", with the satellite out of the shadow of the Earth; or rules as `Sensor` takes them
+        (rad, default -12 degrees), "sunlit", with the satellite out of the shadow of the Earth, "clear", with no Earth between;
+        or rules as `Sensor` takes them
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Who sees what in simulation: the satellite above the mask, the station in the dark, the satellite in sunlight.
+"""Who sees what in simulation: satellite above the mask, station in the dark, satellite in sunlight, no Earth between them.
 
 Rules have the place of now, without light time.
 """
@@ -33,4 +33,14 @@ def rule(name: str) -> tuple[str, dict[str, str], dict[str, float]]:
             "aside": f"sqrt(x**2 + y**2 + z**2 - sunward**2) - {radius!r}",
         }
         return "max(sunward, aside)", text, {}
+    if name == "clear":
+        radius = ELLIPSOIDS["WGS84"][0]
+        along = " + ".join(f"{a}*now_line_{a}" for a in AXES)
+        length = " + ".join(f"now_line_{a}**2" for a in AXES)
+        text = {
+            names("now_place"): "station(t)", **{f"now_line_{a}": f"{a} - now_place_{a}" for a in AXES},
+            "now_past": f"({along})/sqrt({length})",
+            "now_passed": f"sqrt(x**2 + y**2 + z**2 - now_past**2) - {radius!r}",
+        }  # fmt: skip
+        return "max(-now_past, now_passed)", text, {}
     return name, {}, {}
