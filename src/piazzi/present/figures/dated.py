@@ -25,7 +25,7 @@ class _Round(Locator):
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
         axes: Any = getattr(self.axis, "axes", None)
-        wide = 5.0 if axes is None else axes.get_position().width * axes.get_figure(root=True).get_size_inches()[0]
+        wide = 5.0 if axes is None else axes.bbox.width / axes.figure.dpi
         marks = self._calendar.ticks(vmin / self._factor, vmax / self._factor, max(2, int(wide / _ROOM)))
         self._words.seq = [f"{mark.text}\n{mark.below}" if mark.below else mark.text for mark in marks]
         return [mark.t * self._factor for mark in marks]
