@@ -7,7 +7,7 @@ import pytest
 
 import piazzi as pz
 from piazzi import earth
-from piazzi.determination.sensing import measured
+from piazzi.determination.sensing import measured, of_object
 from piazzi.earth.stations import Coordinates
 from piazzi.formats import KINDS
 from piazzi.formats.tdm_keywords import DATA, OF_PARTICIPANT
@@ -247,3 +247,26 @@ def test_quality_is_said(tmp_path):
     _, _, one, other = change(tmp_path, [("RANGE", 0, 1500.0)], {"DATA_QUALITY": "VALIDATED"}, {"DATA_QUALITY": "DEGRADED"})
     new = {*other.assumed} - {*one.assumed}
     assert new == {"rows that the file calls degraded are used as the others"}
+
+
+def test_rows_of_no_object_stay_beside_those_of_the_one_that_is_asked_for(tmp_path):
+    """A clock's bias has no satellite on its path, and moves the times of all."""
+    path = tdm(tmp_path, [("RANGE", 0, 7000.0), ("CLOCK_BIAS", 0, 0.5)], **TWO_WAY, RANGE_UNITS="km")
+    found = pz.read_tracking(path, sigma="1m")
+    rows = of_object(replace(found, object=np.where(found.of_kind("clock_bias"), -1, found.object)), "SAT")
+    assert rows.of_kind("clock_bias").sum() == 1 and rows.of_kind("range").sum() == 1
+
+
+@pytest.mark.parametrize(
+    ("rows", "told", "says"),
+    [
+        ([("DOPPLER_COUNT", 0, 5.0), *SENT], {**TWO_WAY, "TIMETAG_REF": "TRANSMIT"}, "times of reception, not of transmission"),
+        ([("RECEIVE_FREQ_2", 0, 2e9)], {"MODE": "SEQUENTIAL", "PATH": "2,1", "TIMETAG_REF": "TRANSMIT"}, "not of transmit"),
+        ([("RECEIVE_FREQ_2", 0, -1200.0)], {"MODE": "SEQUENTIAL", "PATH": "2,1"}, "FREQ_OFFSET"),
+        ([("VLBI_DELAY", 0, 1e-4), ("CLOCK_BIAS", 0, 0.5)], DIFFERENCE, "delays between stations have the clock of"),
+        ([("RANGE", 0, 7e3), ("CLOCK_BIAS", 0, 0.5)], {"MODE": "SEQUENTIAL", "PATH": "2,1"}, "one-way ranges have the clock"),
+    ],
+)  # fmt: skip
+def test_what_would_be_wrong_in_silence_is_refused(tmp_path, rows, told, says):
+    with pytest.raises(ValueError, match=says):
+        seen(tmp_path, rows, **told)

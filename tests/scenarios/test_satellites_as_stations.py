@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi import earth
+from piazzi.earth.sensors.visibility import rule
 from piazzi.orbit.orbit_place import OrbitPlace
 from piazzi.scenarios import load_scenario
 
@@ -100,6 +101,24 @@ def test_what_is_simulated_is_found_within_its_sigma(tmp_path, sensor):
     assert squared < 27.0  # 99.9 % of eight degrees of freedom are below 26.1
     (tmp_path / "again.toml").write_text(problem.to_toml())
     assert load_scenario(tmp_path / "again.toml").problem.checksums == problem.checksums
+
+
+@pytest.mark.parametrize(
+    ("near", "far", "clear"),
+    [
+        ((7e6, 0.0, 0.0), (4.2e7, 1e5, 0.0), True), ((4.2e7, 1e5, 0.0), (7e6, 0.0, 0.0), True),
+        ((7e6, 0.0, 0.0), (-2.6e7, 1e5, 0.0), False), ((-2.6e7, 1e5, 0.0), (7e6, 0.0, 0.0), False),
+        ((7e6, 0.0, 0.0), (0.0, 2.6e7, 0.0), True), ((6.4e6, -3e7, 0.0), (6.4e6, 3e7, 0.0), True),
+    ],
+)  # fmt: skip
+def test_the_earth_is_between_two_satellites_only_where_it_is(near, far, clear):
+    text, definitions, _ = rule("clear")
+    known = dict(zip("xyz", near, strict=True)) | {f"now_place_{a}": value for a, value in zip("xyz", far, strict=True)}
+    known |= {"sqrt": np.sqrt, "max": max}
+    for name, one in definitions.items():
+        if "," not in name:
+            known[name] = eval(one, {}, known)
+    assert (eval(text, {}, known) > 0) == clear
 
 
 def test_elements_that_are_missing_are_named(tmp_path):

@@ -14,6 +14,7 @@ from piazzi.formats.corrections import ADDED, corrected
 
 DELAY = "station delay"
 TIMED = ("transmit", "receive")
+COMPARED = ("delta_range_delay", "vlbi_delay")  # kinds that compare the clocks of two stations
 
 
 def with_corrections(observations: Observations, sites: StationList | None) -> tuple[Observations, tuple[str, ...]]:
@@ -63,6 +64,9 @@ def _by_clocks(observations: Observations) -> tuple[Observations, tuple[str, ...
             tables.append((observations.t[there], observations.value[there]))
         (times, biases), (changes, drifts) = tables
         rows = own & observations.measured
+        _check_clock(observations, station)
+        if not rows.any():
+            continue
         ahead = np.interp(observations.t[rows], times, biases)
         if len(changes):
             k = np.maximum(np.searchsorted(times, observations.t[rows], side="right") - 1, 0)
@@ -72,6 +76,22 @@ def _by_clocks(observations: Observations) -> tuple[Observations, tuple[str, ...
         name = observations.participants[station]
         said.append(f"times of {name} are less its clock's bias, {ahead.mean():.3g} s, which the file states")
     return (replace(observations, t=t), tuple(said)) if said else (observations, ())
+
+
+def _check_clock(observations: Observations, station: int) -> None:
+    """Raise ValueError where a clock that is not right is in values, not in times alone: two clocks were compared."""
+    name = observations.participants[station]
+    for i, segment in enumerate(observations.segments):
+        rows = (observations.segment == i) & observations.measured
+        own = rows & (observations.station == station)
+        ranges = (own & observations.of_kind("range")).any() and segment.way in ("one-way", "three-way")
+        delays = any((rows & observations.of_kind(kind)).any() for kind in COMPARED)
+        involved = own.any() or name in ((segment.path or ()) + (segment.second_path or ()))
+        if ranges or (delays and involved):
+            what = "delays between stations" if delays else f"{segment.way} ranges"
+            raise ValueError(
+                f"{what} have the clock of {name} in them, whose bias the file states: they are not corrected for it yet"
+            )
 
 
 def _without_delays(observations: Observations) -> tuple[Observations, tuple[str, ...]]:

@@ -14,7 +14,7 @@ from piazzi.determination.ranging import part_of, passes, way_of
 from piazzi.determination.rates import count_of
 from piazzi.determination.sites import Context, aboard
 from piazzi.earth import Station, sensors
-from piazzi.formats import Segment
+from piazzi.formats import TAGS, Segment
 from piazzi.formats.ramps import Ramp, ramp_of
 from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
@@ -43,15 +43,26 @@ def frequencies(context: Context, index: Array) -> Sequence[Part]:
         segment = segment_of(context, rows)
         if segment.way not in (None, "one-way"):
             found += _returned(context, segment, rows)
-        elif (carrier := constant(context, rows)) is None:
+            continue
+        _check(context, segment, rows)
+        if (carrier := constant(context, rows)) is None:
             unknown.append(rows)
         else:
             found.append(_part(context, rows, carrier, estimated=False))
     if unknown:
-        nominal = _rounded(float(np.median(context.observations.value[np.concatenate(unknown)])))
+        nominal = _rounded(context, float(np.median(context.observations.value[np.concatenate(unknown)])))
         context.said[f"the carrier is estimated, before the measurements {nominal / 1e6:g} MHz"] = None
         found += [_part(context, rows, nominal, estimated=True) for rows in unknown]
     return found
+
+
+def _check(context: Context, segment: Segment, rows: Array) -> None:
+    """Raise ValueError for frequencies on one way that are no carrier at the time of its reception."""
+    tag = TAGS[context.observations.tag[rows[0]]] or segment.tag
+    if segment.mode == "single_diff":
+        raise ValueError(f"{context.where}differences of frequencies are not determined from yet")
+    if tag not in (None, "receive"):
+        raise ValueError(f"{context.where}frequencies are determined from at times of reception, not of {tag}")
 
 
 def segment_of(context: Context, rows: Array) -> Segment:
@@ -141,7 +152,12 @@ def counted(context: Context, segment: Segment) -> tuple[str | None, dict[str, A
     return (None, {}) if segment.interval is None else count_of(context, segment, "frequencies")
 
 
-def _rounded(value: float) -> float:
+def _rounded(context: Context, value: float) -> float:
+    if not value > 0.0:
+        raise ValueError(
+            f"{context.where}received frequencies are {value:g} Hz in the median: "
+            "of which frequency are they the offset (FREQ_OFFSET)?"
+        )
     size = 10.0 ** (floor(log10(value)) - DIGITS + 1)
     return size * round(value / size)
 

@@ -42,6 +42,8 @@ def phases(context: Context, index: Array) -> Sequence[Part]:
 def _count(context: Context, rows: Array, kind: str) -> _Count:
     segment = segment_of(context, rows)
     way = way_of(context, segment, rows, kind)
+    if way.tag != "reception":
+        raise ValueError(f"{context.where}phases and counts are determined from at times of reception, not of {way.tag}")
     sent = constant(context, rows)
     if sent is None:
         raise ValueError(f"{context.where}the file does not say of which frequency cycles were counted (TRANSMIT_FREQ)")
@@ -63,12 +65,15 @@ def _part(context: Context, count: _Count, number: int, of: int) -> Part:
     observations = context.observations
     sensor = _sensor(count.way, of, context.clocks)
     since = float(observations.t[count.rows[0]]) + (observations.epoch - context.epoch)
-    numbers = {"cycles": count.cycles, "beat": count.beat, "since": since, f"is_{number}": 1.0}
+    numbers: dict[str, Any] = {
+        f"is_{k}": float(k == number) for k in range(1, of + 1)
+    }  # of passes, whatever stations are called
+    numbers |= {"cycles": count.cycles, "beat": count.beat, "since": since}
     given, rows = context.placed(sensor, count.rows, **numbers)
     part = part_of(context, sensor, given, rows, 1.0)
     zero = float(observations.value[count.rows[0]])
     sigma = count.cycles * FARTHEST
-    own = {name: (role, Gaussian(0.0, sigma**2)) for name, role in sensor.parameters.items()}
+    own = {name: (role, Gaussian(0.0, sigma**2)) for name, role in sensor.parameters.items() if name == f"phase_{number}"}
     return Part(
         sensor, part.station, part.t, part.values - zero, part.noise, part.rows, part.place, part.numbers, part.functions, own
     )

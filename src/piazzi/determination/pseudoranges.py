@@ -18,6 +18,7 @@ from piazzi.problem import Station, Tracking
 from piazzi.problem.checks import Array
 
 NAME = "pseudorange"
+FARTHEST = 1e8  # m, that a signal comes from: a row beyond it is wrong, and its time of sending is not asked of an ephemeris
 ENOUGH, MOST = 4, 40  # rows of one time for a fix, and times of which fixes are made
 
 
@@ -48,7 +49,7 @@ def _parts(context: Context, index: Array) -> Iterator[Part]:
         if not len(rows):
             continue
         part = part_of(context, sensor, given, rows, 1.0, parameters=beliefs(sensor))
-        sent = part.t - part.values[:, 0] / SPEED_OF_LIGHT
+        sent = part.t - np.clip(part.values[:, 0], 0.0, FARTHEST) / SPEED_OF_LIGHT
         ahead = partner.clock(observations.epoch, sent)
         if ahead is None:
             context.said[f"the clock of {partner.name} is right: its ephemeris says nothing of it"] = None

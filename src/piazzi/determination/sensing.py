@@ -212,7 +212,7 @@ def _check_sigmas(observations: Observations, index: Array) -> None:
 def of_object(observations: Observations, chosen: str | None) -> Observations:
     """The rows of one object; raises ValueError with the list where there are several, or not that one.
 
-    Rows of which no file says what they are of are of any object.
+    Rows of which no file says what they are of, such as clocks and frequencies of stations, are of any object.
     """
     known = observations.objects
     if chosen is None or not known:
@@ -224,7 +224,8 @@ def of_object(observations: Observations, chosen: str | None) -> Observations:
         return observations
     if chosen not in known:
         raise ValueError(f"{_where(observations)}no object {chosen!r}; there is {', '.join(known[:8]) or 'no name of any'}")
-    return observations[observations.object == observations.participants.index(chosen)]
+    own = observations.object == observations.participants.index(chosen)
+    return observations[own | ((observations.object < 0) & ~observations.measured)]
 
 
 def _ask(observations: Observations) -> None:

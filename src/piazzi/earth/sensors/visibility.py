@@ -39,8 +39,13 @@ def rule(name: str) -> tuple[str, dict[str, str], dict[str, float]]:
         length = " + ".join(f"now_line_{a}**2" for a in AXES)
         text = {
             names("now_place"): "station(t)", **{f"now_line_{a}": f"{a} - now_place_{a}" for a in AXES},
-            "now_past": f"({along})/sqrt({length})",
+            "now_length": f"sqrt({length})",
+            "now_past": f"({along})/now_length",
             "now_passed": f"sqrt(x**2 + y**2 + z**2 - now_past**2) - {radius!r}",
         }  # fmt: skip
-        return "max(-now_past, now_passed)", text, {}
+        return (
+            "max(max(-now_past, now_past - now_length), now_passed)",
+            text,
+            {},
+        )  # nearest to the Earth beyond either end, or high
     return name, {}, {}
