@@ -1,6 +1,7 @@
 """`piazzi propagate`: files of orbits and scenarios, what is written, and bad input in one line."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -83,6 +84,17 @@ def test_the_forces_of_the_height_are_said(call, opm):
     text = call("propagate", opm, "--to", "0").out
     assert "drag (harris-priester) (default at " in text
     assert "Assumed: cr_a_m = 0.013 m2/kg, cd_a_m = 0.022 m2/kg" in text
+
+
+def test_sunlight_on_laser_spheres_is_known_and_else_its_doubt_is_said(call, opm, tmp_path):
+    """Area over mass of LAGEOS-2: pi 0.3^2 m2 over 405.4 kg (ILRS)."""
+    (tmp_path / "b.opm").write_text(opm_text(replace(arc(x=np.array([12.2e6, 0.0, 0.0, 0.0, 3.5e3, 4.5e3])), name="LAGEOS-2")))
+    found = call("propagate", tmp_path / "b.opm", "--to", "60s", "--json").document["assumed"]
+    (sphere,) = [text for text in found if text.startswith("cr = 1.13 and")]
+    assert float(sphere.split()[4]) == pytest.approx(np.pi * 0.3**2 / 405.38, rel=2e-3)
+    assert not any("cr_a_m" in text or "not in the covariance" in text for text in found)
+    other = call("propagate", opm, "--to", "60s", "--json").document["assumed"]
+    assert "what these coefficients are off by is not in the covariance" in other
 
 
 def test_two_line_elements_have_a_rule_of_thumb(call, tmp_path):

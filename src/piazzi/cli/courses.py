@@ -64,6 +64,7 @@ def course_of(text: str, forces: str | None, begin: str | None, chosen: str | No
         raise click.UsageError("ORBIT is empty", click.get_current_context(silent=True))
     if text.lower().endswith(".toml") or (text in names() and not os.path.exists(text)):
         return _of_scenario(text, forces)
+    from piazzi.determination.orbit_forces import COEFFICIENTS, with_sphere
     from piazzi.determination.words import date
     from piazzi.earth.defaults import default_forces, lowest_height, read_forces
     from piazzi.earth.stepping import longest_step
@@ -73,6 +74,9 @@ def course_of(text: str, forces: str | None, begin: str | None, chosen: str | No
     start = start_of(text, None if begin is None else date(begin, "--from"), chosen)
     height = lowest_height(start.state[:3], start.state[3:])
     choice = default_forces(height) if forces is None else read_forces(forces, height)
+    choice, assumed = with_sphere(choice, start.name)
+    if start.covariance is not None and any(text.partition(" = ")[0] in COEFFICIENTS.values() for text in assumed):
+        assumed = (*assumed, "what these coefficients are off by is not in the covariance")
     P = np.zeros((6, 6)) if start.covariance is None else start.covariance
     problem = Problem(
         choice.forces.model(),
@@ -84,7 +88,7 @@ def course_of(text: str, forces: str | None, begin: str | None, chosen: str | No
         epoch=start.epoch,
         functions=choice.functions(start.epoch, choice.air(start.epoch, start.state)),
     )
-    return Course(start.name, problem, start.source, str(choice), choice.assumed, True, start.covariance is not None)
+    return Course(start.name, problem, start.source, str(choice), assumed, True, start.covariance is not None)
 
 
 def _of_scenario(text: str, forces: str | None) -> Course:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -169,6 +169,17 @@ def _coefficients(
         roles[constant], values[constant] = "estimated", Gaussian(0.0, ACCELERATION**2)
         assumed.append(f"{constant} is estimated, before the measurements 0 +- {ACCELERATION:g} m/s2")
     return roles, values, tuple(assumed)
+
+
+def with_sphere(choice: ForceChoice, name: str) -> tuple[ForceChoice, tuple[str, ...]]:
+    """The forces with the sunlight on a laser sphere of that name, where nobody says its coefficient; and what is assumed."""
+    _, sphere = _ratio(name, None, None)
+    lost = [text for text in choice.assumed if text.startswith("cr_a_m = ")]
+    if sphere is None or not lost:
+        return choice, choice.assumed
+    told = f"cr = {CR:g} and {sphere.area_to_mass:.3g} m2/kg of {sphere.name} ({sphere.source})"
+    values = {**choice.values, "cr_a_m": CR * sphere.area_to_mass}
+    return replace(choice, values=values), (*(text for text in choice.assumed if text not in lost), told)
 
 
 def _ratio(name: str, mass: float | None, area: float | None) -> tuple[float | None, LaserSphere | None]:
