@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import piazzi as pz
 from piazzi import earth
 from piazzi.determination import measured
+from piazzi.determination.directions import _by_times
 from piazzi.determination.document import document
 from piazzi.formats import Observations, Segment
 
@@ -125,3 +127,16 @@ def ranges_left(found):
     """RMS of the residuals of ranges that were used, m."""
     (one,) = [group for group in document(found)["residuals"] if group["component"] == "range"]
     return one["rms"]
+
+
+def test_sigmas_of_times_move_directions_along_their_motion():
+    """A direction that moves at a constant rate is uncertain along it by the rate times the sigma of the time."""
+    t, rate = np.array([0.0, 60.0, 150.0, 9000.0]), np.array([2e-4, -1e-4])
+    values = np.array([6.28, 0.3]) + t[:, None] * rate * [1.0, 1.0]
+    values[:, 0] = np.remainder(values[:, 0], 2.0 * np.pi)
+    across = np.cos(values[:, 1])
+    added = _by_times(t[[2, 0, 1, 3]], values[[2, 0, 1, 3]], np.array([0.5, 0.5, np.nan, 0.5]), across[[2, 0, 1, 3]])
+    for k, i in ((0, 2), (1, 0)):
+        along = 0.5 * rate * [across[i], 1.0]
+        assert_allclose(added[k], np.outer(along, along), rtol=1e-9)
+    assert not added[2:].any()  # no sigma of its time, and no row near it

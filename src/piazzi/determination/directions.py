@@ -21,6 +21,8 @@ from piazzi.problem.checks import Array
 SHIFTS = tuple(30.0 * k - 105.0 for k in range(8))  # s, of the table about a row of an observer that moves
 GEOCENTRE = "500"  # of the Minor Planet Center: reduced to the centre of the Earth
 AZEL, RADEC = ("azimuth", "elevation"), ("right_ascension", "declination")
+SPHERE = (AZEL, RADEC)  # whose first angle is along a parallel
+NEIGHBOUR = 3600.0  # s, between rows from which motion on the sky is told
 XEYN, XSYE = ("x_east", "y_north"), ("x_south", "y_east")
 MOUNTS = {"azel": AZEL, "xeyn": XEYN, "xsye": XSYE}  # as `sensors.azimuth_elevation` calls them
 
@@ -93,9 +95,29 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
     correlation = np.where(both, np.nan_to_num(observations.correlation[rows[:, 1]]), 0.0)
     noise[:, 0, 1] = noise[:, 1, 0] = correlation * sigma[:, 0] * sigma[:, 1]
     t = observations.t[rows.max(axis=1)]
+    noise += _by_times(t, values, observations.time_sigma[rows.max(axis=1)], np.cos(values[:, 1]) if kinds in SPHERE else 1.0)
     return Part(
         sensor, given["name"], t, values, noise, rows, given["place"], given["numbers"], sensor.functions(context.epoch)
     )
+
+
+def _by_times(t: Array, values: Array, spread: Array, across: Any) -> Array:
+    """What standard deviations of times (R,) add to the covariance of directions (R, 2, 2): the motion on the sky, times them.
+
+    The motion is that to the rows before and after, where these are near.
+    """
+    spread = np.nan_to_num(spread)
+    order = np.argsort(t, kind="stable")
+    step, dt = np.diff(values[order], axis=0), np.diff(t[order])
+    step[:, 0] = np.remainder(step[:, 0] + np.pi, 2.0 * np.pi) - np.pi
+    near = (dt > 0) & (dt <= NEIGHBOUR) & np.isfinite(step).all(axis=1)
+    rate = np.where(near[:, None], step, 0.0) / np.where(near, dt, 1.0)[:, None]
+    none, count = np.zeros((1, 2)), np.concatenate([[0], near]) + np.concatenate([near, [0]])
+    moved = np.empty_like(values)
+    moved[order] = (np.vstack([none, rate]) + np.vstack([rate, none])) / np.maximum(count, 1)[:, None]
+    moved[:, 0] *= np.nan_to_num(across)
+    moved *= spread[:, None]
+    return np.asarray(moved[:, :, None] * moved[:, None, :])
 
 
 def _about_its_row(context: Context, row: int, angles: str | None) -> Standing:
