@@ -6,37 +6,25 @@ import numpy as np
 import pytest
 
 import piazzi as pz
-from piazzi.determination import Guess
 from piazzi.determination.analysis import analysed
 from piazzi.determination.approach import approached
 from piazzi.determination.completeness import left_out, words_for
-from piazzi.determination.determining import prepared, solved
+from piazzi.determination.determining import solved
 from piazzi.determination.editing import edited
 from piazzi.determination.faults import CLOCK, MASK, OUTLIER, SETTLING, STATION
 from piazzi.determination.fit import estimators
 from piazzi.earth.defaults import read_forces
 from piazzi.evaluate.information import predicted
-from piazzi.formats import Observations, Segment
 from piazzi.problem.inputs import prepare
+from tests.determination.lasers import EACH, SIGMA, twelve_passes
 
-EPOCH = pz.Epoch("2016-02-13T12:00:00 UTC")
-STATE = np.array([9643000.0, 6000000.0, 4600000.0, -3600.0, 4000.0, 1800.0])  # m, m/s, GCRF: near 12,000 km
-SITES = ("7090", "7119", "7825", "7941")
-SIGMA = 0.03
-EACH = 12  # rows of a pass
 LOST = 1.0 / 20.0  # of rows that are left out, as the guide says
 
 
 @pytest.fixture(scope="module")
 def given():
     """Twelve passes over four stations without noise."""
-    t = np.concatenate([7200.0 * k + np.arange(EACH) * 120.0 for k in range(12)])
-    rows = Observations(
-        epoch=EPOCH, t=t, value=np.full(len(t), 7e6), kinds=("range",), kind=np.zeros(len(t), dtype=int),
-        participants=(*SITES, "LAGEOS-2"), station=np.repeat(np.arange(12) % 4, EACH), object=len(SITES), sigma=SIGMA, tag=1,
-        segments=(Segment("UTC", way="two-way", range_is="half", tag="transmit", wavelength=5.32e-7),),
-    )  # fmt: skip
-    made = prepared(rows, guess=Guess(EPOCH, STATE[:3], STATE[3:], "test"), stations="ilrs")
+    made = twelve_passes()
     return with_values(made, predicted(made.problem, prepare(made.problem, made.tracking), made.states))
 
 

@@ -7,7 +7,6 @@ import piazzi as pz
 from piazzi import earth
 from piazzi.determination import Guess
 from piazzi.determination.determining import prepared
-from piazzi.earth.stations import Coordinates
 from piazzi.evaluate.information import predicted
 from piazzi.formats import Observations, Segment
 from piazzi.problem.inputs import prepare
@@ -24,12 +23,7 @@ def _plain(monkeypatch):
     monkeypatch.setenv("PIAZZI_JIT", "0")
 
 
-def station(name, latitude, longitude):
-    place = earth.geodetic_to_position(np.radians(latitude), np.radians(longitude), 100.0)
-    return earth.Station(name, (Coordinates(tuple(place)),))
-
-
-SITES = [station("A", 10.0, 60.0), station("B", -5.0, 75.0)]
+SITES = [earth.Station.geodetic(n, np.radians(a), np.radians(b), 100.0) for n, a, b in (("A", 10.0, 60.0), ("B", -5.0, 75.0))]
 
 
 def rows(kind, values, sigma, receiver="A", **segment):

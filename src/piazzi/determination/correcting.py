@@ -11,6 +11,7 @@ from piazzi.earth import StationList
 from piazzi.earth.constants import SPEED_OF_LIGHT
 from piazzi.formats import TAGS, Observations, Segment
 from piazzi.formats.corrections import ADDED, corrected
+from piazzi.formats.ramps import series
 
 DELAY = "station delay"
 TIMED = ("transmit", "receive")
@@ -38,10 +39,9 @@ def with_corrections(observations: Observations, sites: StationList | None) -> t
                 "give it as its bias of range, in --stations FILE.toml"
             )
     try:
-        done = corrected(observations)
+        done, clocks = _by_clocks(corrected(observations))
     except ValueError as error:
         raise ValueError(f"{where}{error}") from None
-    done, clocks = _by_clocks(done)
     done, delays = _without_delays(done)
     waiting = [(c.name, c.value) for s in observations.segments for c in s.corrections if c.applied is False and c.value]
     names = dict.fromkeys(name for name, _ in waiting if name in ADDED)
@@ -57,12 +57,8 @@ def _by_clocks(observations: Observations) -> tuple[Observations, tuple[str, ...
     t, said = observations.t.copy(), []
     for station in np.unique(observations.station[observations.of_kind("clock_bias")]).tolist():
         own = observations.station == station
-        tables = []
-        for kind in ("clock_bias", "clock_drift"):
-            there = np.flatnonzero(own & observations.of_kind(kind))
-            there = there[np.argsort(observations.t[there], kind="stable")]
-            tables.append((observations.t[there], observations.value[there]))
-        (times, biases), (changes, drifts) = tables
+        times, biases = series(observations, own, "clock_bias")
+        changes, drifts = series(observations, own, "clock_drift")
         rows = own & observations.measured
         _check_clock(observations, station)
         if not rows.any():

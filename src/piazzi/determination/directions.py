@@ -14,7 +14,6 @@ from piazzi.determination.ranging import EVENTS, passes
 from piazzi.determination.sites import Context, weather_of
 from piazzi.earth import Place, body, sensors, transform
 from piazzi.earth.rotation import frame_named
-from piazzi.formats import TAGS
 from piazzi.outside.table import Table
 from piazzi.problem.checks import Array
 
@@ -63,7 +62,7 @@ def _part(context: Context, index: Array, kinds: tuple[str, str]) -> Part:
     partner, moving = context.partner(number), int(observations.place[first]) >= 0
     nowhere = partner is not None or moving or (number >= 0 and observations.participants[number] == GEOCENTRE)
     site = None if nowhere else context.site(number)
-    tag = EVENTS[TAGS[observations.tag[first]] or segment.tag or "bounce"]
+    tag = EVENTS[context.tag(first) or "bounce"]
     if kinds != RADEC:
         if site is None or context.about == "sun":
             raise ValueError(f"{context.where}azimuths and elevations are of stations, of an orbit about the Earth")

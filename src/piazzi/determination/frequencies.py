@@ -14,7 +14,7 @@ from piazzi.determination.ranging import part_of, passes, way_of
 from piazzi.determination.rates import count_of
 from piazzi.determination.sites import Context, aboard
 from piazzi.earth import Station, sensors
-from piazzi.formats import TAGS, Segment
+from piazzi.formats import Segment
 from piazzi.formats.ramps import Ramp, ramp_of
 from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
@@ -58,7 +58,7 @@ def frequencies(context: Context, index: Array) -> Sequence[Part]:
 
 def _check(context: Context, segment: Segment, rows: Array) -> None:
     """Raise ValueError for frequencies on one way that are no carrier at the time of its reception."""
-    tag = TAGS[context.observations.tag[rows[0]]] or segment.tag
+    tag = context.tag(rows[0])
     if segment.mode == "single_diff":
         raise ValueError(f"{context.where}differences of frequencies are not determined from yet")
     if tag not in (None, "receive"):

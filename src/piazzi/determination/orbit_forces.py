@@ -157,8 +157,8 @@ def _coefficients(
         if parameter not in open_:
             continue
         if sphere is not None and parameter == "cr_a_m":
-            values[parameter] = coefficient * sphere.area_to_mass
-            assumed.append(f"cr = {CR:g} and {sphere.area_to_mass:.3g} m2/kg of {sphere.name} ({sphere.source})")
+            values[parameter], told = _sunlight(sphere)
+            assumed.append(told)
             continue
         roles[parameter] = "estimated"
         mean = values[parameter] if ratio is None else coefficient * ratio
@@ -177,9 +177,15 @@ def with_sphere(choice: ForceChoice, name: str) -> tuple[ForceChoice, tuple[str,
     lost = [text for text in choice.assumed if text.startswith("cr_a_m = ")]
     if sphere is None or not lost:
         return choice, choice.assumed
-    told = f"cr = {CR:g} and {sphere.area_to_mass:.3g} m2/kg of {sphere.name} ({sphere.source})"
-    values = {**choice.values, "cr_a_m": CR * sphere.area_to_mass}
-    return replace(choice, values=values), (*(text for text in choice.assumed if text not in lost), told)
+    value, told = _sunlight(sphere)
+    left = (text for text in choice.assumed if text not in lost)
+    return replace(choice, values={**choice.values, "cr_a_m": value}), (*left, told)
+
+
+def _sunlight(sphere: LaserSphere) -> tuple[float, str]:
+    """The coefficient of sunlight on a laser sphere (m2/kg), and where it is from."""
+    said = f"cr = {CR:g} and {sphere.area_to_mass:.3g} m2/kg of {sphere.name} ({sphere.source})"
+    return CR * sphere.area_to_mass, said
 
 
 def _ratio(name: str, mass: float | None, area: float | None) -> tuple[float | None, LaserSphere | None]:

@@ -12,7 +12,7 @@ from piazzi.determination.parts import Part
 from piazzi.determination.sites import Context, aboard, weather_of
 from piazzi.earth import Station, laser_sphere, sensors
 from piazzi.earth.constants import SPEED_OF_LIGHT
-from piazzi.formats import TAGS, Segment
+from piazzi.formats import Segment
 from piazzi.problem.checks import Array
 
 EVENTS = {"transmit": "transmission", "bounce": "bounce", "receive": "reception"}
@@ -116,7 +116,7 @@ def _sensor(way: Way, clocks: bool) -> Any:
 
 def way_of(context: Context, segment: Segment, rows: Array, kind: str) -> Way:
     """Path, tag and medium of rows of a segment; raises ValueError for what is open, or not taken yet."""
-    tag, own = TAGS[context.observations.tag[rows[0]]] or segment.tag, bool(aboard(context.observations)[rows[0]])
+    tag, own = context.tag(rows[0]), bool(aboard(context.observations)[rows[0]])
     what = PLURALS.get(kind, kind)
     if segment.way not in ("one-way", "two-way", "three-way"):
         open_ = "of a path that the file does not say (--range two-way) are"

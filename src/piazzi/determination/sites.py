@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.earth import Epoch, Place, Station, StationList, Weather, ilrs_stations, mpc_stations, read_stations
-from piazzi.formats import Observations
+from piazzi.formats import TAGS, Observations
 from piazzi.problem.checks import Array
 from piazzi.text import nearest
 
@@ -58,6 +58,10 @@ class Context:
         if not name:
             raise ValueError(f"{self.where}the file does not say which station measured: no station can be found for it")
         return station_named(name, self.sites, self.where)
+
+    def tag(self, row: int) -> str | None:
+        """What the time of a row is of, transmit, bounce or receive; None where nobody says it."""
+        return TAGS[self.observations.tag[row]] or self.observations.segments[int(self.observations.segment[row])].tag
 
     def partner(self, index: int) -> Any:
         """The participant in orbit that measured, None where it is a station."""

@@ -62,12 +62,8 @@ def ramp_of(observations: Observations, participant: str) -> Ramp:
     if participant not in observations.participants:
         raise ValueError(f"there is no participant {participant!r}{nearest(participant, observations.participants)}")
     own = observations.participant == observations.participants.index(participant)
-    tables = []
-    for kind in ("transmit_frequency", "transmit_frequency_rate"):
-        rows = np.flatnonzero(own & observations.of_kind(kind))
-        rows = rows[np.argsort(observations.t[rows], kind="stable")]
-        tables.append((observations.t[rows], observations.value[rows]))
-    (times, frequencies), (changes, rates) = tables
+    times, frequencies = series(observations, own, "transmit_frequency")
+    changes, rates = series(observations, own, "transmit_frequency_rate")
     if not len(times):
         raise ValueError(f"no frequency that {participant} transmitted is given")
     events = np.unique(np.concatenate([times, changes[changes > times[0]]]))
@@ -79,3 +75,10 @@ def ramp_of(observations: Observations, participant: str) -> Ramp:
         goes_on = times[j] < t
         frequency[i] = frequency[i - 1] + rate[i - 1] * (t - events[i - 1]) if goes_on else frequencies[j]
     return Ramp(events, frequency, rate)
+
+
+def series(observations: Observations, own: Array, kind: str) -> tuple[Array, Array]:
+    """Times and values of the rows of a kind among some (J,), in order of time."""
+    rows = np.flatnonzero(own & observations.of_kind(kind))
+    rows = rows[np.argsort(observations.t[rows], kind="stable")]
+    return observations.t[rows], observations.value[rows]

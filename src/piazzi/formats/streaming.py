@@ -142,11 +142,6 @@ class Lines:
             self._meta.append(mark)
             self._state = "data" if mark == b"DATA_START" else self._state
 
-    @property
-    def at_mark(self) -> bool:
-        """Whether rows wait that the next mark of a TDM would close: to be asked for before it is added."""
-        return bool(self._waiting)
-
     def _whole(self) -> tuple[list[tuple[int, bytes]], list[tuple[int, bytes]]]:
         """Lines that may be read, and those that wait: an angle of a TDM without its partner."""
         if self._kind != "TDM":

@@ -16,12 +16,12 @@ NIGHT = radians(-12.0)  # of the Sun's elevation: the end of nautical twilight
 
 def rule(name: str) -> tuple[str, dict[str, str], dict[str, float]]:
     """A rule by its name: text that is above zero where it holds, definitions, numbers of the station."""
+    line = tuple(f"now_line_{a}" for a in AXES)
+    seen = {names("now_place"): "station(t)"} | {f"now_line_{a}": f"{a} - now_place_{a}" for a in AXES}
     if name == "above":
         air = Air("now_")
-        line = tuple(f"now_line_{a}" for a in AXES)
-        text = {names("now_place"): "station(t)"} | {f"now_line_{a}": f"{a} - now_place_{a}" for a in AXES}
         air.turn("t", line)
-        return "now_elevation - mask", text | air.definitions, air.numbers | {"mask": 0.0}
+        return "now_elevation - mask", seen | air.definitions, air.numbers | {"mask": 0.0}
     if name == "dark":
         air = Air("dusk_")
         air.turn("t", tuple(f"sun_{a}" for a in AXES))
@@ -38,14 +38,11 @@ def rule(name: str) -> tuple[str, dict[str, str], dict[str, float]]:
         along = " + ".join(f"{a}*now_line_{a}" for a in AXES)
         length = " + ".join(f"now_line_{a}**2" for a in AXES)
         text = {
-            names("now_place"): "station(t)", **{f"now_line_{a}": f"{a} - now_place_{a}" for a in AXES},
+            **seen,
             "now_length": f"sqrt({length})",
             "now_past": f"({along})/now_length",
             "now_passed": f"sqrt(x**2 + y**2 + z**2 - now_past**2) - {radius!r}",
         }  # fmt: skip
-        return (
-            "max(max(-now_past, now_past - now_length), now_passed)",
-            text,
-            {},
-        )  # nearest to the Earth beyond either end, or high
+        # the line comes nearest to the Earth's centre beyond either end, or passes above the Earth
+        return "max(max(-now_past, now_past - now_length), now_passed)", text, {}
     return name, {}, {}
