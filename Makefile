@@ -66,7 +66,7 @@ constraints: ## resolve every pin in constraints.txt anew
 	@echo "Resolving the newest versions that work together (a few minutes)"
 	@rm -rf .cache/pins && "$(PYTHON)" -m venv .cache/pins
 	@.cache/pins/bin/python -m pip -qq --no-input install --no-compile '.[dev,bench,cluster,docs]'
-	@{ sed -n '/^#/p' constraints.txt; .cache/pins/bin/python -m pip freeze --exclude piazzi | sed '/\.dev[0-9]/d' | LC_ALL=C sort -f; } > .cache/pins.txt
+	@{ sed -n '/^#/p' constraints.txt; .cache/pins/bin/python -m pip freeze --all --exclude pip --exclude piazzi | sed '/\.dev[0-9]/d' | LC_ALL=C sort -f; } > .cache/pins.txt
 	@mv .cache/pins.txt constraints.txt && rm -rf .cache/pins
 
 clean: ## remove what was made, but keep .venv
@@ -91,6 +91,7 @@ distclean: clean ## remove .venv too
 
 .venv/.dev: .venv/.runtime
 	@echo "Installing what its tests need"
+	@$(FETCH) 'setuptools>=70.1' # oem and filterpy are published as source alone, and are built in here
 	@$(FETCH) '.[dev]'
 	@$(COMPILE)
 	@touch $@
@@ -103,6 +104,7 @@ distclean: clean ## remove .venv too
 
 .venv/.bench: .venv/.runtime
 	@echo "Installing what its benchmarks compare with"
+	@$(FETCH) 'setuptools>=70.1'
 	@$(FETCH) '.[bench]'
 	@$(COMPILE)
 	@touch $@

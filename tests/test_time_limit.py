@@ -209,3 +209,15 @@ def test_so_are_common_parts_that_take_long_to_find(monkeypatch):
 
 def test_limits_leave_the_code_as_it_is():
     assert source(sensors=[]).count("def scalar_f") == 2
+
+
+def test_a_clock_that_jumps_is_no_work_of_sympys(monkeypatch):
+    """As one does where the whole machine was stopped for a while."""
+    start = time.monotonic()
+    monkeypatch.setattr(time_limit, "_clock", lambda: lambda: 100.0 if time.monotonic() - start > 0.1 else 0.0)
+
+    def wait():
+        time.sleep(0.4)
+        return 7
+
+    assert with_time_limit(wait, 0.2) == 7

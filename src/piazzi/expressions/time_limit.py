@@ -15,6 +15,7 @@ from typing import TypeVar
 A = TypeVar("A")
 T = TypeVar("T")
 SECONDS = 5.0  # of a processor, where the system can tell, for one equation
+_SLICES = 20  # of a limit, after each of which the clock is looked at
 _REPEAT_SECONDS = 0.2  # seconds after which the interruption is repeated: SymPy catches some
 
 
@@ -55,21 +56,25 @@ def each_with_time_limit(call: Callable[[A], T], items: Sequence[A], seconds: fl
 
 
 class _Timer:
-    """A thread that interrupts the one that made it, until it is stopped."""
+    """A thread that interrupts the one that made it, until it is stopped.
+
+    It looks at the clock in slices, none of which counts for more than twice its length: where the whole machine was stopped
+    for a while, or a garbage collection held the interpreter, SymPy did nothing, yet the clock of a processor may tell of it.
+    """
 
     def __init__(self, seconds: float) -> None:
         # no Exception, because SymPy catches those; one of its own, so that of nested limits each ends its own block
         self.interruption: type[BaseException] = type("Interruption", (BaseException,), {})
         self.seconds, self._sent = seconds, False
-        self._thread, self._used = threading.get_ident(), _clock()
-        self._start = self._used()
+        self._thread, self._clock = threading.get_ident(), _clock()
+        self._seen, self._used = self._clock(), 0.0
         self._lock, self._stopped = threading.Lock(), threading.Event()
         threading.Thread(target=self._run, daemon=True).start()
 
     def restart(self) -> None:
         """Begin to count anew."""
         with self._lock:
-            self._start = self._used()
+            self._seen, self._used = self._clock(), 0.0
 
     def stop(self) -> None:
         """End; nothing is interrupted any more when this has returned."""
@@ -79,12 +84,14 @@ class _Timer:
             _interrupt(self._thread, None)
 
     def _run(self) -> None:
-        wait = self.seconds
-        while not self._stopped.wait(wait):
+        part = self.seconds / _SLICES
+        while not self._stopped.wait(_REPEAT_SECONDS if self._sent else part):
             with self._lock:
-                wait = self._start + self.seconds - self._used()
-                if wait <= 0 and not self._stopped.is_set():
-                    wait, self._sent = _REPEAT_SECONDS, True
+                now = self._clock()
+                self._used += min(now - self._seen, 2 * part)
+                self._seen = now
+                if self._used >= self.seconds and not self._stopped.is_set():
+                    self._sent = True
                     _interrupt(self._thread, self.interruption)
 
 
