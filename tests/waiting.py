@@ -1,4 +1,4 @@
-"""Waiting for other processes: for what shows that they are so far, never for so many seconds."""
+"""Waiting for other processes, for what shows that they are so far; and work that has to be little, on any machine."""
 
 import time
 
@@ -13,3 +13,25 @@ def until(condition, process=None):
             raise AssertionError(f"ended with {process.returncode}: {process.stderr.read() if process.stderr else ''}")
         assert time.monotonic() < end, "waited for nothing"
         time.sleep(0.005)
+
+
+def little(call, seconds):
+    """What a call returns that keeps a processor busy for so many seconds at most.
+
+    They are those of a machine that turns a loop a million times in 0.015 s; a slower one may take longer in proportion.
+    The clock may jump, where all stood still for a while: then the call is made again.
+    """
+    for _ in range(3):
+        started = time.process_time()
+        result = call()
+        taken = time.process_time() - started
+        if taken <= seconds or taken <= seconds * min(_turns(), _turns()) / 0.015:
+            return result
+    raise AssertionError(f"{taken:.2f} s, where {seconds} s are plenty")
+
+
+def _turns():
+    started = time.process_time()
+    for _ in range(1_000_000):
+        pass
+    return time.process_time() - started

@@ -10,6 +10,7 @@ import pytest
 import piazzi as pz
 from piazzi.formats import Arc, Ephemeris, oem_text
 from tests.determination.fixing import EPOCH, truth
+from tests.waiting import HANGS
 
 T = np.arange(0.0, 43200.0, 900.0)
 
@@ -34,7 +35,7 @@ def folder(tmp_path_factory):
 
 def program(folder, *arguments):
     return subprocess.run(
-        [sys.executable, "-m", "piazzi", "determine", *arguments], cwd=folder, capture_output=True, text=True, timeout=600
+        [sys.executable, "-m", "piazzi", "determine", *arguments], cwd=folder, capture_output=True, text=True, timeout=HANGS
     )
 
 

@@ -15,6 +15,7 @@ from piazzi.determination.case import Case
 from piazzi.earth.eop import tables
 from piazzi.formats import Arc, Ephemeris, oem_text
 from tests.determination.fixing import EPOCH, truth
+from tests.waiting import HANGS
 
 T = np.arange(0.0, 43200.0, 900.0)
 CASE = """
@@ -54,7 +55,7 @@ def folder(tmp_path_factory):
 
 def program(folder, *arguments, name="determine"):
     return subprocess.run(
-        [sys.executable, "-m", "piazzi", name, *arguments], cwd=folder, capture_output=True, text=True, timeout=600
+        [sys.executable, "-m", "piazzi", name, *arguments], cwd=folder, capture_output=True, text=True, timeout=HANGS
     )
 
 

@@ -6,6 +6,8 @@ import sys
 import numpy as np
 import pytest
 
+from tests.waiting import HANGS
+
 STATIONS = '[[stations]]\nname = "7090"\nlatitude = -29.0\nlongitude = 115.3\nheight = "240 m"\n'
 CRD = """H1 CRD  1 2016 02 14 01
 H2 YARAGADE   7090  5 13  4
@@ -86,7 +88,7 @@ def test_it_ends_with_one_line_and_leaves_nothing(folder, arguments):
     (folder / "out.oem").unlink(missing_ok=True)
     done = subprocess.run(
         [sys.executable, "-m", "piazzi", "determine", *arguments, *sites, *output],
-        cwd=folder, capture_output=True, text=True, timeout=600,
+        cwd=folder, capture_output=True, text=True, timeout=HANGS,
     )  # fmt: skip
     said = [line for line in done.stderr.splitlines() if "compiling" not in line]
     assert done.returncode in (2, 3), done.stderr

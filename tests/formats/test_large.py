@@ -1,6 +1,5 @@
 """A million lines: how long they take, and how much memory at their peak."""
 
-import time
 import tracemalloc
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 
 import piazzi as pz
 from tests.formats.test_tdm import message
+from tests.waiting import little
 
 LINES = 1_000_000
 
@@ -28,9 +28,7 @@ def million(tmp_path_factory):
 def test_a_million_lines_are_read_in_three_seconds(million):
     path, values = million
     pz.read_tracking(path)  # imports and tables
-    started = time.process_time()
-    rows = pz.read_tracking(path)
-    assert time.process_time() - started < 3.0
+    rows = little(lambda: pz.read_tracking(path), 3.0)
     assert len(rows) == LINES
     factor = np.tile([1e3, 1e3, np.pi / 180, np.pi / 180], LINES // 4)
     np.testing.assert_allclose(rows.value, np.array([float(f"{value:.9f}") for value in values]) * factor, rtol=1e-15)
@@ -60,9 +58,7 @@ def test_a_million_laser_ranges(tmp_path, data_dir):
     path.write_text("\n".join([*lines[:at], *rows, "H8", "H9"]) + "\n")
     del rows
     pz.read_tracking(data_dir / "earth/lageos2/lageos2_20160214.npt")
-    started = time.process_time()
-    found = pz.read_tracking(path)
-    assert time.process_time() - started < 3.0
+    found = little(lambda: pz.read_tracking(path), 3.0)
     assert len(found) == LINES and found.t[-1] - found.t[0] == pytest.approx(1e-3 * (LINES - 1), abs=1e-9)
     del found
     tracemalloc.start()

@@ -6,6 +6,7 @@ import pytest
 import piazzi as pz
 from piazzi import formats
 from piazzi.earth.geodetic import geodetic_to_position
+from tests.waiting import little
 
 T0 = pz.Epoch("2024-05-05T12:00:00 UTC")
 
@@ -181,16 +182,12 @@ def test_what_cannot_be_read_is_refused_in_one_line(tmp_path, text, words, said)
 
 
 def test_a_million_lines_in_three_seconds(tmp_path):
-    from time import perf_counter
-
     lines = "\n".join(
         f"2024-05-{1 + k // 86400:02d}T{k // 3600 % 24:02d}:{k // 60 % 60:02d}:{k % 60:02d},7{k:06d}.25" for k in range(100_000)
     )
     path = table(tmp_path, "time[UTC],range[m]\n" + lines + "\n")
-    pz.read_tracking(path)
-    start = perf_counter()
-    assert len(pz.read_tracking(path)) == 100_000
-    assert perf_counter() - start < 1.0  # a tenth of the lines, three times as long for a machine with others on it
+    pz.read_tracking(path)  # imports and tables
+    assert len(little(lambda: pz.read_tracking(path), 0.3)) == 100_000  # a tenth of the lines
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.waiting import HANGS
+
 PROGRAM = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # else the system ends the process
@@ -23,7 +25,7 @@ COMMANDS = {
 
 def limited(limit: int, code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", PROGRAM.format(limit=limit) + code], cwd=folder, capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", PROGRAM.format(limit=limit) + code], cwd=folder, capture_output=True, text=True, timeout=HANGS
     )
 
 

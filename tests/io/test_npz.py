@@ -4,7 +4,6 @@ import io
 import os
 import pickle
 import struct
-import time
 import tracemalloc
 import zipfile
 
@@ -209,9 +208,9 @@ def test_arrays_that_are_not_what_they_declare_are_refused(tmp_path, content):
         pz.load(tmp_path / "a.npz")
 
 
-def test_a_bomb_is_refused_before_it_is_read(tmp_path):
+def test_a_bomb_is_refused_before_it_is_read(tmp_path, monkeypatch):
     zeros = io.BytesIO()
-    np.lib.format.write_array_header_1_0(zeros, {"descr": "<f8", "fortran_order": False, "shape": (2**27,)})
+    np.lib.format.write_array_header_1_0(zeros, {"descr": "<f8", "fortran_order": False, "shape": (2**24,)})
     put(tmp_path / "whole.npz", meas=None)
     with (
         zipfile.ZipFile(tmp_path / "whole.npz") as whole,
@@ -221,19 +220,13 @@ def test_a_bomb_is_refused_before_it_is_read(tmp_path):
             archive.writestr(info.filename, whole.read(info))
         with archive.open("meas.npy", "w") as member:
             member.write(zeros.getvalue())
-            for _ in range(64):
+            for _ in range(8):
                 member.write(bytes(2**24))
-    started = time.process_time()
-    with zipfile.ZipFile(tmp_path / "a.npz") as archive, archive.open("meas.npy") as member:
-        while member.read(2**24):
-            pass
-    reading = time.process_time() - started
+    monkeypatch.setattr(zipfile.ZipFile, "open", lambda *arguments: pytest.fail("it is opened"))
     tracemalloc.start()
-    started = time.process_time()
     try:
         with pytest.raises(ValueError, match="absurd"):
             pz.load(tmp_path / "a.npz")
-        assert time.process_time() - started < reading / 2
         assert tracemalloc.get_traced_memory()[1] < 2**24
     finally:
         tracemalloc.stop()

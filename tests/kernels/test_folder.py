@@ -16,6 +16,7 @@ import pytest
 import piazzi as pz
 from piazzi.kernels import KernelSpec, cache, folder, ownership
 from piazzi.kernels.bundle import Given
+from tests.waiting import HANGS
 
 MODEL = pz.Model(["x"], ["-k*x"], parameters=["k"])
 GIVEN = Given(parameters=np.full(1, 0.5), manoeuvres=np.zeros(1), data=np.zeros(1))
@@ -313,7 +314,7 @@ def test_a_child_does_not_wait_for_a_thread_that_it_does_not_have(place, made):
             os._exit(0)
         finally:
             os._exit(1)
-    end = time.monotonic() + 60
+    end = time.monotonic() + HANGS
     while not (status := os.waitpid(child, os.WNOHANG))[0] and time.monotonic() < end:
         time.sleep(0.01)
     if not status[0]:

@@ -1,5 +1,6 @@
 """Whole studies in processes: the same bits however they are run, interrupted and continued."""
 
+import contextlib
 import os
 import re
 import subprocess
@@ -22,6 +23,7 @@ from piazzi.study.tasks import Piece, Task
 from piazzi.study.versions import fingerprint
 from tests.study.estimators import Poison, Refusing
 from tests.study.studies import small
+from tests.waiting import HANGS, until
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -224,7 +226,7 @@ def test_a_study_that_workers_cannot_read_ends_at_once(tmp_path):
         "except RuntimeError as error:\n    print(error)\n"
     )
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run([sys.executable, script], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, script], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=HANGS)
     assert re.fullmatch("a worker cannot read the study: AttributeError.*Mine.*\n", done.stdout), done
     assert os.listdir(tmp_path) == ["own.py"]
 
@@ -331,26 +333,20 @@ def test_workers_end_with_the_process_that_started_them(tmp_path):
     command = [sys.executable, "-m", "piazzi", "study", "b612-range", "--runs", "100000", "--with", "graph", "--workers", "2"]
     process = subprocess.Popen([*command, "-o", tmp_path / "s.nc"], stderr=subprocess.DEVNULL)
     try:
-        for _ in range(600):
-            children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-            found = _descendants(process.pid) if children.exists() else []
-            if len(found) >= 2:
-                break
-            time.sleep(0.1)
-        assert len(found) >= 2
+        until(lambda: len(_descendants(process.pid)) >= 2, process)
+        found = _descendants(process.pid)
     finally:
         process.kill()
         process.wait()
-    for _ in range(300):
-        if not any(_alive(pid) for pid in found):
-            return
-        time.sleep(0.1)
-    raise AssertionError("workers outlive their parent")
+    until(lambda: not any(_alive(pid) for pid in found))
 
 
 def _descendants(pid):
-    tasks = Path(f"/proc/{pid}/task")
-    return [int(child) for task in tasks.iterdir() for child in (task / "children").read_text().split()]
+    found = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        with contextlib.suppress(OSError):  # a thread that has just ended
+            found += map(int, (task / "children").read_text().split())
+    return found
 
 
 def _alive(pid):
