@@ -40,7 +40,7 @@ def test_json_has_counts_passes_conventions_and_what_is_open(call, tdm):
     assert (found["first"], found["last"]) == ("2007-08-29T06:00:02 UTC", "2007-08-29T14:00:02 UTC")
     (range_,) = [kind for kind in found["kinds"] if kind["kind"] == "range"]
     assert range_["unit"] == "m" and range_["rows"] == 3 and range_["stations"] == ["WHM1"]
-    assert [(one["station"], one["rows"]) for one in found["passes"]] == [("WHM1", 12), ("HBSTK", 9)]
+    assert [(one["station"], one["rows"]) for one in found["passes"]] == [("WHM1", 8), ("HBSTK", 6), ("WHM1", 4), ("HBSTK", 3)]
     assert [told["rows"] for told in found["conventions"]] == [9, 12]
     assert found["conventions"][1]["corrections"] == [{"name": "range", "value": 2.0 * 299792458.0, "applied": True}]
     assert found["conventions"][1]["range_modulus"] == 1e7 * 299792458.0

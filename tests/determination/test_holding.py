@@ -1,7 +1,6 @@
 """Rows that are held back: how they are named, how they are predicted, and what the verdict says of it."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,11 +11,13 @@ from piazzi.determination.approach import approached
 from piazzi.determination.case import Case
 from piazzi.determination.determining import prepared, solved
 from piazzi.determination.fit import estimate, estimators
-from piazzi.determination.holding import check, held, passes
-from piazzi.determination.instruments import pass_of_rows
-from piazzi.determination.verdict import Sentence, unseen
+from piazzi.determination.holding import check, held
+from piazzi.determination.honesty import unseen
+from piazzi.determination.passes import passes
+from piazzi.determination.sentence import Sentence
 from piazzi.evaluate.information import predicted
-from piazzi.formats import Observations, Segment
+from piazzi.formats import Observations, Segment, summary
+from piazzi.formats.passes import numbered
 from piazzi.problem.inputs import prepare
 
 EPOCH = pz.Epoch("2016-02-13T12:00:00 UTC")
@@ -70,8 +71,8 @@ def test_revolutions_that_follow_each_other_are_two_passes_of_a_station():
     """A satellite at 500 km comes again after 94.6 minutes and is seen for ten: 85 minutes are no gap within a pass."""
     revolution = 2.0 * np.pi * np.sqrt(6878137.0**3 / 3.986004418e14)
     t = np.concatenate([np.arange(0.0, 600.0, 60.0), revolution + np.arange(0.0, 600.0, 60.0)])
-    tracking = pz.Tracking(t, np.zeros((20, 1)), np.array(["s1"] * 20), epoch=EPOCH)
-    assert pass_of_rows(SimpleNamespace(labels={"s1": "7090"}), tracking).tolist() == [1] * 10 + [2] * 10
+    one = np.zeros(20, dtype=int)
+    assert numbered(t, one, one).tolist() == [1] * 10 + [2] * 10
 
 
 def test_passes_are_parted_by_gaps_and_by_blocks_that_follow_each_other(given):
@@ -82,10 +83,24 @@ def test_passes_are_parted_by_gaps_and_by_blocks_that_follow_each_other(given):
     keep[:3] = False
     assert [len(own) for own in passes(given, keep)] == [2] + [5] * 11
     seen = given.measured.observations
-    for segment, expected in (([0, 1, 0, 1, 1], [5]), ([0, 0, 1, 1, 1], [2, 3])):
-        blocks = replace(seen, segment=np.array(segment + [2] * 55), segments=(seen.segments[0],) * 3)
+    for segment, expected in (([0, 1, 0, 1, 1], [5]), ([0, 0, 1, 1, 1], [5]), ([0, 1, 3, 4, 5], [5])):
+        blocks = replace(seen, segment=np.array(segment + [2] * 55), segments=(seen.segments[0],) * 6)
         parted = replace(given, measured=replace(given.measured, observations=blocks))
         assert [len(own) for own in passes(parted, np.ones(60, dtype=bool))][: len(expected)] == expected
+
+
+def test_blocks_of_a_file_with_a_pause_between_them_are_passes_everywhere():
+    """A station that turns to another satellite for a quarter of an hour begins a pass, one whose file is cut does not."""
+    t = np.concatenate([np.arange(0.0, 300.0, 60.0), 1200.0 + np.arange(0.0, 300.0, 60.0)])
+    block = np.repeat([0, 1], 5)
+    assert numbered(t, np.zeros(10, dtype=int), block).tolist() == [1] * 5 + [2] * 5
+    assert numbered(t, np.zeros(10, dtype=int), 0 * block).tolist() == [1] * 10
+    assert numbered(60.0 * np.arange(10), np.zeros(10, dtype=int), block).tolist() == [1] * 10
+    seen = rows(t, np.zeros(10, dtype=int), block)
+    made = prepared(seen, guess=Guess(EPOCH, STATE[:3], STATE[3:], "test"), stations="ilrs", estimate="bias.range/pass=1m")
+    counted = [len(own) for own in passes(made, np.ones(10, dtype=bool))]
+    assert [one["rows"] for one in summary(seen)["passes"]] == counted == [5, 5]
+    assert list(made.problem.model.constants) == ["range_bias_1", "range_bias_2"]
 
 
 @pytest.mark.slow  # kernels of ten seconds

@@ -93,7 +93,7 @@ def test_biases_of_passes_are_looked_for_and_found_only_where_there_are_some(giv
     found = with_common_errors(one)
     new = found.problem.model.constants
     assert len(new) == 12 and set(found.measured.parameters) == set(new)
-    assert found.labels["range_bias_1"].name == "bias.range.7090/1"
+    assert found.labels["range_bias_1"].name == "bias.range.7090/2016-02-13T12:00:00"
     assert "in its pass 2016-02-13 12:00 to 12:20" in found.labels["range_bias_1"].words
     assert "bias of each pass" in found.assumed[-1]
     picked = np.array([[dict(s.numbers)[f"is_{name}"] for name in new] for s in found.problem.stations])

@@ -8,7 +8,7 @@ import pytest
 
 import piazzi as pz
 from piazzi.determination.analysis import analysed
-from piazzi.determination.instruments import pass_of_rows
+from piazzi.determination.passes import pass_of_rows
 from piazzi.determination.remedies import remedy
 from piazzi.determination.setup import follow
 from piazzi.evaluate.information import predicted
@@ -78,7 +78,7 @@ def test_accelerations_that_wander_are_named_with_their_size(given):
 
 def test_biases_of_passes_are_named_with_their_size(given):
     """Of four sigma from pass to pass."""
-    passes = pass_of_rows(given.measured, given.tracking)
+    passes = pass_of_rows(given.measured, given.tracking, given.rows)
     for seed in range(3):
         bias = 4.0 * SIGMA * np.random.default_rng(100 + seed).standard_normal(passes.max() + 1)
         found = re.fullmatch(r".*--estimate bias\.range/pass=(\S+)m", named(given, given.states, bias[passes][:, None], seed))

@@ -5,10 +5,11 @@ import pytest
 
 import piazzi as pz
 from piazzi.determination.burns import Burn, burns_of
+from piazzi.determination.earlier import STATES, Earlier
 from piazzi.determination.motion import Extra, Numbers
-from piazzi.determination.physical import USUAL, at_rest, believed, by_shares, said, said_name, share_of, value_of
+from piazzi.determination.physical import USUAL, at_rest, believed, by_shares, result_name, said, said_name, share_of, value_of
 from piazzi.determination.ramps import RAMP, pieces, profiles
-from piazzi.determination.unknowns import asked, considered, listed
+from piazzi.determination.unknowns import Label, asked, considered, listed
 from piazzi.outside.function import Function
 
 WHEN = "2026-11-03T04:12:00Z"
@@ -233,3 +234,11 @@ def test_a_profile_has_the_area_one():
     values = np.array([of.value(x) for x in t[95000:125000:10]])[:, 0]
     assert np.trapezoid(values, t[95000:125000:10]) == pytest.approx(1.0, abs=1e-3)
     assert of.value(11.0) == (0.5, 0.0) and of.value(50.5) == (0.0, 1.0)
+
+
+def test_another_night_knows_a_value_again_by_what_it_is_of_not_by_its_number():
+    before = Earlier(pz.Epoch(WHEN), np.zeros(7), np.eye(7), "last.json", names=(*STATES, "bias.range.7090"))
+    for station, place in (("7090", 6), ("7119", None)):
+        labels = {"range_bias_1": Label(f"bias.range.{station}", "")}
+        assert before.place(result_name(labels, "range_bias_1"), 0.0, 0.0) == place
+    assert result_name({}, "cd_a_m_share") == "cd_a_m"

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from piazzi.determination.analysis import Analysis, analysed
-from piazzi.determination.instruments import pass_of_rows, with_instruments
+from piazzi.determination.instruments import with_instruments
+from piazzi.determination.passes import pass_of_rows
 from piazzi.determination.setup import Setup, renewed
 from piazzi.determination.unknowns import PASS, Asked, Estimated
 from piazzi.estimate.chi_square import quantile
@@ -51,7 +52,7 @@ def together(given: Setup, analysis: Analysis, rows: Array) -> tuple[float, int]
 
     It is their median, so that outliers count as one row each.
     """
-    passes = pass_of_rows(given.measured, given.tracking)
+    passes = pass_of_rows(given.measured, given.tracking, given.rows)
     squares = []
     for one in np.unique(passes[rows & (passes > 0)]):
         own = analysis.whitened[rows & (passes == one)]

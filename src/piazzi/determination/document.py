@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination import holding
+from piazzi.determination.departures import departures
 from piazzi.determination.guesses import CARTESIAN, SCHEMA
 from piazzi.determination.initial_result import UndeterminedError
+from piazzi.determination.motion import words_of
 from piazzi.determination.orbit import definite_root, jacobian
-from piazzi.determination.physical import believed, nodes_of, said, said_name
+from piazzi.determination.physical import believed, nodes_of, result_name, said, said_name
 from piazzi.determination.published import beside
 from piazzi.determination.residuals import groups, rejected
 from piazzi.determination.verdict import KEYS
@@ -32,7 +34,7 @@ def document(found: Any) -> dict[str, Any]:
         "object": found.object,
         "epoch": found.epoch.to(found.scale),
         "frame": found.frame,
-        "names": [said_name(name) for name in model.names],
+        "names": [result_name(found.setup.labels, name) for name in model.names],
         "units": [model.unit(said_name(name)) for name in model.names],
         "mean": _listed(mean),
         "sigma": _listed(sigma),
@@ -102,15 +104,19 @@ def solution(found: Any) -> tuple[Array, Array]:
 def estimated(found: Any) -> list[dict[str, Any]]:
     """What was estimated beside position and velocity, with what was known of it before."""
     problem, k, labels = found.problem, found.setup.solution, found.setup.labels
+    apart = departures(found.setup, found.estimate)
+    far = {} if apart is None else dict(zip(apart.names, apart.sigmas.tolist(), strict=True))
     mean, J = said(problem, found.estimate.mean[k])
     variance = np.diag(J @ found.estimate.covariance[k] @ J.T)
     out = []
     for i, name in enumerate(problem.model.names[6:], start=6):
         before, spread = believed(problem, name)
         out.append({
-            "name": labels[name].name if name in labels else name, "unit": problem.model.unit(said_name(name)),
+            "name": result_name(labels, name), "unit": problem.model.unit(said_name(name)),
             "prior": before, "prior_sigma": spread, "value": finite(float(mean[i])),
             "sigma": finite(float(np.sqrt(variance[i]))) if variance[i] >= 0 else None,
+            # beside the schema: what it is, and how far from the prior, in sigma of that difference
+            "words": labels[name].words if name in labels else words_of(said_name(name)), "departure": finite(far.get(name)),
         })  # fmt: skip
     return out
 
@@ -120,7 +126,7 @@ def considered(found: Any) -> list[dict[str, Any]]:
     units, labels = {p.name: p.unit for p in found.problem.model.parameters}, found.setup.labels
     given = {name: believed(found.problem, name) for name in found.problem.considered}
     return [
-        {"name": labels[name].name if name in labels else name, "unit": units[said_name(name)], "value": value, "sigma": sigma}
+        {"name": result_name(labels, name), "unit": units[said_name(name)], "value": value, "sigma": sigma}
         for name, (value, sigma) in given.items()
     ]
 

@@ -40,8 +40,8 @@ class Earlier:
     Attributes
     ----------
     epoch : of the state
-    names : of the values, position and velocity first; what stays is told by names of results, as is `density`, that of the
-        air at the epoch
+    names : of the values, position and velocity first; what stays is told by names of results, which say of what it is, as
+        is `density`, that of the air at the epoch
     mean, covariance : (n,) and (n, n), position and velocity in the GCRF
     used : first and last measurement that it was made of, None where nobody says it
     source : its file

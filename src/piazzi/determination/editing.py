@@ -15,7 +15,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis
 from piazzi.determination.faults import CORRELATED, DUPLICATE, OUTLIER, STATION
-from piazzi.determination.holding import labels_of, passes
+from piazzi.determination.passes import labels_of, passes
 from piazzi.determination.setup import Setup, scale_of
 from piazzi.estimate.chi_square import cdf, quantile
 from piazzi.problem.checks import Array

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.holding import labels_of, on_sky, passes
+from piazzi.determination.holding import on_sky
+from piazzi.determination.passes import labels_of, passes
 from piazzi.determination.setup import Setup, follow
 from piazzi.earth import Epoch, transform
 from piazzi.evaluate.information import predicted

@@ -8,17 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import pi
 from typing import Any
 
 import numpy as np
 
 from piazzi.determination.analysis import Analysis, analysed, of_orbit
 from piazzi.determination.fit import estimate
-from piazzi.determination.ranging import GAP
+from piazzi.determination.passes import labels_of, passes
 from piazzi.determination.setup import Setup, scale_of
 from piazzi.determination.sweep import swept
-from piazzi.earth.stepping import turning
 from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate, Estimator
 from piazzi.evaluate.information import singular
@@ -103,31 +101,6 @@ def check(how: Any) -> str | float:
     if not 0.0 < share < 1.0:
         raise ValueError(f"{text[:40]!r} is no part of the rows: write last, passes, none, or a share such as 1/4")
     return share
-
-
-def passes(given: Setup, keep: Array) -> list[Array]:
-    """Rows that are kept, of one station without a long gap, each (R,), in order of their beginnings.
-
-    Blocks of a file that follow each other are passes of their own; those that overlap, as of ranges and of angles, are one.
-    """
-    labels = labels_of(given)
-    t, rows = given.tracking.row_times, given.rows
-    gap = min(GAP, pi / turning(given.states[0, :3], given.states[0, 3:6])) if given.measured.about == "earth" else GAP
-    segment = np.where(rows.max(axis=1) >= 0, given.measured.observations.segment[rows.max(axis=1)], -1)
-    there = keep & np.isfinite(given.tracking.values).any(axis=1)
-    found: list[Array] = []
-    for label in dict.fromkeys(labels[there].tolist()):
-        own = np.flatnonzero((labels == label) & there)
-        last = {s: t[own[segment[own] == s][-1]] for s in np.unique(segment[own]).tolist()}
-        until = np.maximum.accumulate([last[s] for s in segment[own].tolist()])  # of the blocks so far
-        found += np.split(own, np.flatnonzero((np.diff(t[own]) > gap) | (t[own[1:]] > until[:-1])) + 1)
-    return sorted(found, key=lambda rows: float(t[rows[0]]))
-
-
-def labels_of(given: Setup) -> Array:
-    """(J,), the names by which users know the stations of rows."""
-    which = given.tracking.stations_of(given.problem)
-    return np.array([given.measured.labels[s.name] for s in given.problem.stations], dtype=object)[which]
 
 
 def held(given: Setup, estimator: Estimator, answer: Estimate, analysis: Analysis, keep: Array, how: str | float) -> Held:

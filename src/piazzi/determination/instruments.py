@@ -12,14 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from piazzi.determination.ranging import GAP
+from piazzi.determination.passes import pass_of_rows
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import BIAS, CLOCK, PASS, Asked, Label
 from piazzi.earth.sensors import Instrument
 from piazzi.model import Sensor
 from piazzi.model.renaming import renamed, with_names
-from piazzi.problem import Gaussian, Tracking
-from piazzi.problem.checks import Array
+from piazzi.problem import Gaussian
 from piazzi.text import nearest, one_line
 
 TIMES = 10.0  # times the noise of its rows is the sigma of a bias that nobody gives one
@@ -66,10 +65,10 @@ def with_instruments(seen: Measured, given: Sequence[Asked]) -> Measured:
     )
 
 
-def passes(seen: Measured) -> tuple[list[int], dict[tuple[str, int], str]]:
-    """The pass of each station of the problem, counted from 1 for each place, and from when to when each is."""
-    number, every = np.zeros(len(seen.tracking.row_times), dtype=np.int64), pass_of_rows(seen, seen.tracking)
-    said: dict[tuple[str, int], str] = {}
+def passes(seen: Measured) -> tuple[list[int], dict[tuple[str, int], tuple[str, str]]]:
+    """The pass of each station of the problem, counted from 1 for each place; when each begins, and from when to when it is."""
+    number, every = np.zeros(len(seen.tracking.row_times), dtype=np.int64), pass_of_rows(seen, seen.tracking, seen.rows)
+    said: dict[tuple[str, int], tuple[str, str]] = {}
     count: dict[str, int] = {}
     for one in range(1, int(every.max(initial=0)) + 1):
         own = np.flatnonzero(every == one)
@@ -77,22 +76,10 @@ def passes(seen: Measured) -> tuple[list[int], dict[tuple[str, int], str]]:
         number[own] = k = count[label] = count.get(label, 0) + 1
         ends = seen.tracking.row_times[own[[0, -1]]].tolist()
         first, last = (str(seen.epoch + x)[:16].replace("T", " ") for x in ends)
-        said[label, k] = f"{first} to {last[11:] if last[:10] == first[:10] else last}"
+        begun = str(seen.epoch + float(seen.tracking.row_times[own[0]]))[:19]
+        said[label, k] = begun, f"{first} to {last[11:] if last[:10] == first[:10] else last}"
     of_station = [int(number[seen.tracking.row_stations == s.name].max(initial=0)) for s in seen.stations]
     return of_station, said
-
-
-def pass_of_rows(seen: Measured, tracking: Tracking) -> Array:
-    """Number of the pass (J,) of each row, from 1, each station's in order of time; 0 where nothing was measured."""
-    labels = np.array([seen.labels[name] for name in tracking.row_stations], dtype=object)
-    there = np.isfinite(tracking.values).any(axis=1)
-    out, last = np.zeros(len(labels), dtype=np.int64), 0
-    for label in dict.fromkeys(labels.tolist()):
-        own = np.flatnonzero((labels == label) & there)
-        if len(own):
-            out[own] = last + 1 + np.concatenate([[0], np.cumsum(np.diff(tracking.row_times[own]) > GAP)])
-            last = int(out[own[-1]])
-    return out
 
 
 def _constants(seen: Measured, one: Asked, before: Mapping[str, int]) -> list[Constant]:
@@ -118,7 +105,8 @@ def _constants(seen: Measured, one: Asked, before: Mapping[str, int]) -> list[Co
         name = f"{what.kind}.{label}" if what.kind == CLOCK else f"{what.kind}.{kind}.{label}"
         words = f"{_WORDS[what.kind].format(kind.replace('_', ' '))} of {label}"
         if which:
-            name, words = f"{name}/{which}", f"{words} in its pass {spans[label, which]}"
+            begun, lasted = spans[label, which]
+            name, words = f"{name}/{begun}", f"{words} in its pass {lasted}"
         unit = _unit(seen, number, kind)
         sigma = what.size(unit, _usual(seen, number, kind, members))
         found.append(Constant(f"{number}_{k}", number, tuple(members), one.role, sigma, unit, Label(name, words)))

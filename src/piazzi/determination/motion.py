@@ -108,7 +108,7 @@ def by_parts(name: str, one: Asked, before: Gaussian, first: float, last: float,
     for k, each in enumerate(names):
         start, end = (epoch + t for t in (first + one.what.period * k, first + one.what.period * (k + 1)))
         span = f"from {_minute(start)} to {_minute(end)}" if k < count - 1 else f"from {_minute(start)} on"
-        labels[each] = Label(f"{one.what.label}/{k + 1}", f"{words_of(name)} {span}")
+        labels[each] = Label(f"{one.what.label}/{start.to('UTC')[:19]}", f"{words_of(name)} {span}")
     if count == 1:
         return Extra(instead(definitions, name, names[0]), labels=labels)
     now = {f"{name}_now": f"{name}_of(t, {', '.join(names)})"}

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from piazzi.determination.live import AXES, Taken
-from piazzi.determination.ranging import GAP
 from piazzi.earth import Epoch
+from piazzi.formats.passes import GAP
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,11 @@ def said_name(name: str) -> str:
     return name.removesuffix(SHARE) if name.startswith(POSITIVE) else name
 
 
+def result_name(labels: Mapping[str, Label], name: str) -> str:
+    """The name by which results have a value, and another night finds it again: of which station, date or engine it is."""
+    return labels[name].name if name in labels else said_name(name)
+
+
 def said(problem: Problem, mean: Array) -> tuple[Array, Array]:
     """Values (n,) as results have them, and their derivatives (n, n) by those that are estimated."""
     names = problem.model.names

@@ -13,6 +13,7 @@ from piazzi.determination.sites import Context, aboard, weather_of
 from piazzi.earth import Station, laser_sphere, sensors
 from piazzi.earth.constants import SPEED_OF_LIGHT
 from piazzi.formats import Segment
+from piazzi.formats.passes import GAP
 from piazzi.problem.checks import Array
 
 EVENTS = {"transmit": "transmission", "bounce": "bounce", "receive": "reception"}
@@ -23,7 +24,6 @@ PLURALS = {
     "doppler_count": "counts of Doppler cycles",
 }  # fmt: skip
 DELAYED = ("range", "time_of_flight")  # that the troposphere is added to
-GAP = 3600.0  # s without a row, behind which another pass begins: a low satellite comes again after 75 min or more
 
 
 class Way(NamedTuple):

@@ -16,7 +16,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis
 from piazzi.determination.completeness import carrying
-from piazzi.determination.instruments import pass_of_rows
+from piazzi.determination.passes import pass_of_rows
 from piazzi.determination.setup import Setup, scale_of
 from piazzi.earth.force_options import CONSTANT
 from piazzi.estimate.chi_square import quantile
@@ -132,7 +132,7 @@ def _accelerations(given: Setup, states: Array, analysis: Analysis, there: Array
 def _biases(given: Setup, analysis: Analysis, there: Array) -> Iterator[tuple[str, float, Array]]:
     """A bias of each pass, of one kind of measurement after the other."""
     row, column = np.nonzero(there)
-    passes = pass_of_rows(given.measured, given.tracking)[row]
+    passes = pass_of_rows(given.measured, given.tracking, given.rows)[row]
     stations = given.tracking.stations_of(given.problem)[row]
     sensors = {s.name: s for s in given.problem.model.sensors}
     kinds = np.array([

@@ -14,8 +14,9 @@ from piazzi.determination.beliefs import beliefs
 from piazzi.determination.case import Case
 from piazzi.determination.holding import Held
 from piazzi.determination.orbit import Orbit
+from piazzi.determination.sentence import Sentence
 from piazzi.determination.setup import Setup, carried
-from piazzi.determination.verdict import DECISIVE, Sentence
+from piazzi.determination.verdict import DECISIVE
 from piazzi.earth import Epoch, transform
 from piazzi.estimate.estimator import Estimate
 from piazzi.problem import Problem, Tracking

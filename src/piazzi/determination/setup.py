@@ -14,7 +14,19 @@ from piazzi.determination.earlier import Earlier, root_of
 from piazzi.determination.guesses import Guess
 from piazzi.determination.motion import Extra, process_noise, with_processes
 from piazzi.determination.orbit_forces import Chosen
-from piazzi.determination.physical import AIR, DRAG, POSITIVE, SHARE, USUAL, WAVES, at_rest, is_node, said_name, slope_of
+from piazzi.determination.physical import (
+    AIR,
+    DRAG,
+    POSITIVE,
+    SHARE,
+    USUAL,
+    WAVES,
+    at_rest,
+    is_node,
+    result_name,
+    said_name,
+    slope_of,
+)
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import Label
 from piazzi.earth import EphemerisWarning, Epoch
@@ -62,7 +74,12 @@ class Setup:
     @property
     def labels(self) -> Mapping[str, Label]:
         """How users know what has names for kernels only."""
-        return {**self.measured.labels_of_constants, **self.chosen.extra.labels}
+        return labels_of(self.measured, self.chosen)
+
+
+def labels_of(measured: Measured, chosen: Chosen) -> dict[str, Label]:
+    """How users know what has names for kernels only."""
+    return {**measured.labels_of_constants, **chosen.extra.labels}
 
 
 def setup(
@@ -104,7 +121,7 @@ def setup(
                 f"--from {_plain(earlier.epoch)}"
             )
         assumed += earlier.assumed
-        problem, before = _known(problem, earlier, begin, float(times[0]))
+        problem, before = _known(problem, earlier, labels_of(measured, chosen), begin, float(times[0]))
     start = np.concatenate([guess.state, problem.mean[6:]])
     states = _followed(problem, start, guess.epoch - measured.epoch, times, chosen.max_step)
     if earlier is None:
@@ -137,7 +154,7 @@ def renewed(given: Setup, measured: Measured, chosen: Chosen) -> Setup:
     if given.earlier is None:
         problem = replace(problem, prior=old.prior, prior_time=begin)
     else:
-        problem, before = _known(problem, given.earlier, begin, float(given.tracking.times[0]))
+        problem, before = _known(problem, given.earlier, labels_of(measured, chosen), begin, float(given.tracking.times[0]))
     place = {name: i for i, name in enumerate(old.model.names)}
     states = np.tile(problem.mean, (len(given.states), 1))
     for i, name in enumerate(problem.model.names):
@@ -151,12 +168,15 @@ def _begun(problem: Problem, t: float) -> Problem:
     return replace(problem, manoeuvres=[m for m in problem.manoeuvres if m.time > t + SAME * max(abs(t), 1.0)])
 
 
-def _known(problem: Problem, earlier: Earlier, t: float, first: float) -> tuple[Problem, tuple[Array, Array]]:
+def _known(
+    problem: Problem, earlier: Earlier, labels: Mapping[str, Label], t: float, first: float
+) -> tuple[Problem, tuple[Array, Array]]:
     """The problem with an earlier orbit for its prior, and the belief at the first row with a root of its covariance.
 
     What that knew of the same processes and constants goes on with its correlations: constants are states then, at rest.
     """
-    known = {name: place for name in problem.model.names if (place := earlier.place(said_name(name), t, first)) is not None}
+    places = {name: earlier.place(result_name(labels, name), t, first) for name in problem.model.names}
+    known = {name: place for name, place in places.items() if place is not None}
     problem = at_rest(problem, [name for name in problem.model.constants if name in known])
     names, parameters = problem.model.states, dict(problem.parameters)
     mean, P = problem.prior.mean.copy(), problem.prior.covariance.copy()

@@ -50,7 +50,10 @@ def heading(found: Any, facts: dict[str, Any]) -> Iterator[str]:
 
 def grids(found: Any, facts: dict[str, Any]) -> list[Grid]:
     """State, elements, residuals, rejected rows."""
-    tables = [_state(facts), *([_elements(facts)] if facts["elements"] else []), _residuals(facts)]
+    tables = [
+        _state(facts), *([_elements(facts)] if facts["elements"] else []), *([_beside(facts)] if facts["estimated"] else []),
+        _residuals(facts),
+    ]  # fmt: skip
     return [
         *tables,
         *([_rejected(facts)] if facts["rejected"] else []),
@@ -61,11 +64,24 @@ def grids(found: Any, facts: dict[str, Any]) -> list[Grid]:
 
 def _state(facts: dict[str, Any]) -> Grid:
     rows = []
-    shows = displays(facts["units"], [[v] for v in facts["mean"]], [range(3), range(3, 6)])
-    for show, name, *numbers in zip(shows, *(facts[k] for k in ("names", "mean", "sigma")), strict=True):
+    shows = displays(facts["units"][:6], [[v] for v in facts["mean"][:6]], [range(3), range(3, 6)])
+    for show, name, *numbers in zip(shows, *(facts[k][:6] for k in ("names", "mean", "sigma")), strict=True):
         value, sigma = (np.nan if v is None else v for v in numbers)
         rows.append((name, *with_sigma(value * show.factor, sigma * show.factor), show.unit))
     return Grid(f"State at {facts['epoch']}, {facts['frame']}", ("", "value", "sigma", "unit"), tuple(rows))
+
+
+def _beside(facts: dict[str, Any]) -> Grid:
+    rows, found = [], facts["estimated"]
+    shows = displays([one["unit"] for one in found], [[one["value"], one["prior_sigma"]] for one in found], [])
+    for show, one in zip(shows, found, strict=True):
+        value, sigma, before, spread = (
+            np.nan if one[k] is None else one[k] * show.factor for k in ("value", "sigma", "prior", "prior_sigma")
+        )
+        texts = (*with_sigma(value, sigma), *with_sigma(before, spread))
+        rows.append((one["words"], *texts, show.unit, number(one["departure"], 2)))
+    columns = ("", "value", "sigma", "before", "sigma\nbefore", "unit", "departure\n[sigma]")
+    return Grid("Estimated beside it, and what was known before", columns, tuple(rows))
 
 
 def _elements(facts: dict[str, Any]) -> Grid:

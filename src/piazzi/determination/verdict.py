@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from piazzi.determination.analysis import Analysis, of_orbit
-from piazzi.determination.common import together
 from piazzi.determination.completeness import left_out, words_for
-from piazzi.determination.faults import STATION, Faults
-from piazzi.determination.holding import GOOD, Held, labels_of
-from piazzi.determination.remedies import remedy
+from piazzi.determination.faults import Faults
+from piazzi.determination.holding import Held
+from piazzi.determination.honesty import believable, explained, honest, unseen
+from piazzi.determination.sentence import Sentence, count_of
 from piazzi.determination.setup import WIDE, Setup, scale_of
-from piazzi.estimate.chi_square import quantile
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.information import singular
 from piazzi.evaluate.judgement import APART, NEAR
 from piazzi.evaluate.metrics import apart
-from piazzi.evaluate.quantities import finite, number
+from piazzi.evaluate.quantities import number
 from piazzi.orbit import state_axes
 from piazzi.problem.checks import Array
 
 KEYS = ("seen", "alone", "converged", "honest", "agreed", "complete")
 DECISIVE = KEYS[:3]
-SURE = 0.999  # of the two-sided test of residuals
 TOLD = 3  # forces that are left out, the largest
 UNLIKELY = 0.01  # of another orbit that fits
 STILL = 1e-2  # sigma of a last step
@@ -40,20 +36,6 @@ AXES = (
 )
 
 
-@dataclass(frozen=True)
-class Sentence:
-    """Whether it is so (None: there was nothing to test with), the figure, how it was tested, and the words."""
-
-    ok: bool | None
-    figure: float | None
-    test: str
-    sentence: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
-        return {"ok": self.ok, "figure": finite(self.figure), "test": self.test, "sentence": self.sentence}
-
-
 def verdict(
     given: Setup,
     name: str,
@@ -65,6 +47,7 @@ def verdict(
 ) -> dict[str, Sentence]:
     """The six of an answer, that of the first estimate; `held` is what became of rows that were held back."""
     answer = estimates[name]
+    said = believable(given, answer, honest(given, analysis, keep, faults))
     return dict(
         zip(
             KEYS,
@@ -72,7 +55,7 @@ def verdict(
                 seen(given, analysis, keep),
                 alone(given),
                 converged(given, answer, analysis, keep),
-                explained(given, answer, analysis, keep, unseen(honest(given, analysis, keep, faults), held)),
+                explained(given, answer, analysis, keep, unseen(said, held)),
                 agreed(given, name, estimates),
                 complete(given, answer, analysis, keep),
             ),
@@ -138,7 +121,7 @@ def alone(given: Setup) -> Sentence:
     test = f"all orbits that fit, from {given.guess.orbits.starts} starts"
     if others <= UNLIKELY:
         return Sentence(True, others, test, f"Alone: no other orbit that fits has a probability above {UNLIKELY:g}.")
-    more = _count(len(modes) - 1, "other orbit")
+    more = count_of(len(modes) - 1, "other orbit")
     return Sentence(False, others, test, f"Not alone: {more} fit, with a probability of {number(others, 2)} together.")
 
 
@@ -148,7 +131,7 @@ def converged(given: Setup, answer: Estimate, analysis: Analysis | None, keep: A
     if not answer.success:
         return Sentence(False, None, test, f"Not converged: {answer.message}.")
     if analysis is None or answer.view != "delayed" or not given.problem.is_noise_free or "weights" in answer.details:
-        return Sentence(True, None, test, f"Converged: the estimator ended after {_count(answer.iterations, 'iteration')}.")
+        return Sentence(True, None, test, f"Converged: the estimator ended after {count_of(answer.iterations, 'iteration')}.")
     scale = scale_of(given, given.states[0])
     left = analysis.toward(keep, analysis.information(keep, scale), scale)[1]
     if not left <= STILL:
@@ -157,76 +140,8 @@ def converged(given: Setup, answer: Estimate, analysis: Analysis | None, keep: A
         True,
         left,
         test,
-        f"Converged: after {_count(answer.iterations, 'iteration')} another step would go {number(left, 1)} sigma.",
+        f"Converged: after {count_of(answer.iterations, 'iteration')} another step would go {number(left, 1)} sigma.",
     )
-
-
-def honest(given: Setup, analysis: Analysis | None, keep: Array, faults: Faults) -> Sentence:
-    """Whether residuals are as large as their sigmas say; what is known of passes that were left out is said."""
-    fitted = _fitted(given, analysis, keep, faults.reasons)
-    more = f" Left out: {'; '.join(faults.said)}." if faults.said else ""
-    return replace(fitted, sentence=fitted.sentence + more)
-
-
-def _fitted(given: Setup, analysis: Analysis | None, keep: Array, reasons: Array) -> Sentence:
-    test = f"sum of squared residuals in sigma against chi-square at {SURE:.1%}"
-    if analysis is None:
-        return Sentence(None, None, test, "Honest: there are no residuals to judge by.")
-    labels, there = labels_of(given), np.isfinite(given.tracking.values).any(axis=1)
-    left = dict.fromkeys(labels[reasons == STATION].tolist())
-    wrong = sorted(label for label in left if (reasons[(labels == label) & there] == STATION).all())
-    if wrong:
-        names = ", ".join(wrong)
-        return Sentence(False, None, test, f"Not honest: all measurements of {names} contradict those of the others.")
-    whitened = analysis.whitened[keep]
-    squares = whitened[np.isfinite(whitened)] ** 2
-    free = len(squares) - given.problem.model.n + len(analysis.prior_miss)
-    if free < 1:
-        return Sentence(None, None, test, "Honest: there are no more measurements than unknowns, so sigmas cannot be tested.")
-    total = float(squares.sum() + (analysis.prior_miss**2).sum())
-    size = float(np.sqrt(total / free))
-    high, low = quantile(SURE, free), quantile(1.0 - SURE, free)
-    shared = together(given, analysis, keep)
-    if total <= high and shared is not None and shared[0] > quantile(SURE, shared[1]):
-        size = float(np.sqrt(shared[0] / shared[1]))
-        return Sentence(
-            False, size, f"{test}; medians of passes likewise",
-            f"Not honest: residuals of a pass go together, by {number(size, 3)} times what their sigmas allow.",
-        )  # fmt: skip
-    if total > high:
-        return Sentence(
-            False, size, test,
-            f"Not honest: residuals are {number(size, 3)} times as large as their sigmas say, "
-            "and so may be the errors of the orbit.",
-        )  # fmt: skip
-    fits = f"residuals are {number(size, 3)} of their sigmas" if total < low else "residuals are as large as their sigmas say"
-    note = ": these are cautious" if total < low else ""
-    return Sentence(True, size, test, f"Honest: {fits}{note}.")
-
-
-def unseen(fitted: Sentence, held: Held | None) -> Sentence:
-    """The sentence on residuals with what became of rows that were predicted by the others."""
-    if held is None or not held.groups or not held.freedom:
-        return fitted
-    what = {"passes": "passes left out in turn", "last": "the last pass, left out,"}.get(held.how, "the last rows, left out,")
-    many = f"{len(held.groups)} " if held.how == "passes" else ""
-    found = (
-        f"{many}{what} are predicted with squared errors {number(held.nees, 2)} times what their covariances say "
-        f"({held.coverage:.0%} within 95 %)"
-    )
-    test = f"{fitted.test}; predictions of rows left out, up to {GOOD:g} times their covariances"
-    if held.honest or fitted.ok is False:
-        figure = fitted.figure if held.honest else max(fitted.figure or 0.0, float(np.sqrt(held.nees)))
-        return Sentence(fitted.ok, figure, test, f"{fitted.sentence} {found[0].upper()}{found[1:]}.")
-    return Sentence(False, float(np.sqrt(held.nees)), test, f"Not honest: {found}.")
-
-
-def explained(given: Setup, answer: Estimate, analysis: Analysis | None, keep: Array, said: Sentence) -> Sentence:
-    """The sentence on residuals with the option that explains them best, where they are not as they should be."""
-    if said.ok is not False or said.figure is None or analysis is None or answer.view != "delayed" or not answer.success:
-        return said
-    words = remedy(given, answer.mean, analysis, keep)
-    return replace(said, sentence=f"{said.sentence} Explained by {words}.") if words else said
 
 
 def complete(given: Setup, answer: Estimate, analysis: Analysis | None, keep: Array) -> Sentence:
@@ -271,10 +186,6 @@ def agreed(given: Setup, name: str, estimates: Mapping[str, Estimate]) -> Senten
 def apart_by(answer: Estimate, other: Estimate, k: int) -> float:
     """The largest difference of a state of the orbit at an epoch, in sigma; see `apart`."""
     return apart(answer, other, k, 6)
-
-
-def _count(many: int, what: str) -> str:
-    return f"{many} {what}{'' if many == 1 else 's'}"
 
 
 def _metres(value: float) -> str:

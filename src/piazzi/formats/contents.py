@@ -10,9 +10,10 @@ import numpy as np
 
 from piazzi.formats.kinds import KINDS, TAGS
 from piazzi.formats.observations import Array, Observations, Segment
+from piazzi.formats.passes import numbered
 
 SCHEMA = "piazzi.tracking/1"
-LEAST_GAP, LONG = 600.0, 5.0  # a pass ends where nothing came for ten minutes, and for five times the usual interval
+LEAST_GAP = 600.0  # s, of times in which nobody measured anything
 GAPS = 10
 
 
@@ -73,25 +74,19 @@ def _finite(value: Any) -> float | None:
 
 
 def passes(rows: Observations) -> Iterator[dict[str, Any]]:
-    """Passes of each object over each station in order of time: runs of rows without a long gap.
-
-    A gap is long where it is more than ten minutes, and more than five times the usual interval of that pair.
-    """
+    """Passes of each object over each station in order of time, as `numbered` parts them."""
     found: list[tuple[float, dict[str, Any]]] = []
     pairs = rows.station.astype(np.int64) * (len(rows.participants) + 2) + rows.object
-    order = np.lexsort([rows.t, pairs])
-    for own in np.split(order, np.flatnonzero(np.diff(pairs[order])) + 1) if len(rows) else []:
-        steps = np.diff(rows.t[own])
-        usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-        cuts = np.flatnonzero(steps > max(LEAST_GAP, LONG * usual)) + 1
-        for part in np.split(own, cuts):
-            first, last = int(part[0]), int(part[-1])
-            one = {
-                "station": _name(rows, rows.station[first]), "object": _name(rows, rows.object[first]),
-                "first": _date(rows, first), "last": _date(rows, last), "seconds": float(rows.t[last] - rows.t[first]),
-                "rows": len(part), "kinds": [rows.kinds[i] for i in np.unique(rows.kind[part])],
-            }  # fmt: skip
-            found.append((float(rows.t[first]), one))
+    number = numbered(rows.t, pairs, rows.segment)
+    order = np.lexsort([rows.t, number])
+    for part in np.split(order, np.flatnonzero(np.diff(number[order])) + 1) if len(rows) else []:
+        first, last = int(part[0]), int(part[-1])
+        one = {
+            "station": _name(rows, rows.station[first]), "object": _name(rows, rows.object[first]),
+            "first": _date(rows, first), "last": _date(rows, last), "seconds": float(rows.t[last] - rows.t[first]),
+            "rows": len(part), "kinds": [rows.kinds[i] for i in np.unique(rows.kind[part])],
+        }  # fmt: skip
+        found.append((float(rows.t[first]), one))
     yield from (one for _, one in sorted(found, key=lambda pair: pair[0]))
 
 

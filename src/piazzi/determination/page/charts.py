@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.holding import passes
 from piazzi.determination.page.sampled import Sampled
+from piazzi.determination.passes import passes
 from piazzi.determination.residuals import table
 from piazzi.determination.setup import scale_of
 from piazzi.evaluate.information import factor
