@@ -43,6 +43,20 @@ def test_the_two_agree_where_both_have_measured():
     assert np.abs(a - b).max() < 2e-4  # s: the errors of daily UT1 in the rapid file
 
 
+@pytest.mark.parametrize("cell", ["0.1234567", " .1234567", "-.1234567", "+0.123456", "12345.e-5", "1234567.0", "- .123456"])
+def test_numbers_in_columns_are_those_of_float(tmp_path, cell):
+    lines, file = head(astropy_iers_data.IERS_B_FILE, 20), tmp_path / "c04"
+    lines[12] = lines[12][:38] + f"{cell:>12}" + lines[12][50:]
+    file.write_text("\n".join(lines))
+    if cell.startswith("- "):
+        with pytest.raises(ValueError, match=r"line 13: '- \.123456' is not a number"):
+            read_eop(file)
+        return
+    columns = (26, 38), (38, 50), (62, 74), (74, 86)
+    wanted = np.array([[float(line[a:b]) for a, b in columns] for line in lines if line[:4].isdigit()])
+    assert (read_eop(file).daily_pole == wanted * ARCSEC).all()
+
+
 @pytest.mark.parametrize(
     ("damage", "message"),
     [

@@ -1,5 +1,7 @@
 """Ranges against light times by repetition along a propagated orbit; their derivatives against differences; laws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,18 @@ def test_two_ways_are_the_mean_of_the_legs_of_a_station_that_stands_still():
     p = problem(*(sensors.range(path, name=path, tag="bounce") for path in light.PATHS[:2]), place=still)
     x = orbit("GEO")
     assert abs(p.measure("two-way", x, T) - p.measure("one-way", x, T))[0] < 1e-8
+
+
+def test_passes_of_a_station_are_checked_at_the_door_as_one(monkeypatch):
+    looked = []
+    value = Table.value
+    monkeypatch.setattr(Table, "value", lambda self, *t: looked.append(t) or value(self, *t))
+    one = problem(
+        sensors.range(), place=Table([-90000.0, 0.0, 90000.0], np.tile([4.1e6, 1.0e6, 4.76e6, 0.0, 0.0, 0.0], (3, 1)))
+    )
+    once = len(looked)
+    replace(one, stations=[replace(one.stations[0], name=f"pass {i}") for i in range(5)])
+    assert len(looked) == 2 * once > 0
 
 
 def test_light_time_goes_to_zero_as_light_gets_faster(monkeypatch):

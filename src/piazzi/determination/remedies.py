@@ -20,7 +20,7 @@ from piazzi.determination.passes import pass_of_rows
 from piazzi.determination.setup import Setup, scale_of
 from piazzi.earth.force_options import CONSTANT
 from piazzi.estimate.chi_square import quantile
-from piazzi.orbit import state_axes
+from piazzi.orbit import orbit_axes
 from piazzi.problem.checks import Array
 
 SURE = 0.999
@@ -102,7 +102,7 @@ def _accelerations(given: Setup, states: Array, analysis: Analysis, there: Array
     t, path, back = carrying(given, states)
     if not t[-1] > t[0]:
         return
-    axes = np.array([state_axes(x[:3], x[3:6])[:3, :3] for x in path])
+    axes = orbit_axes(path[:, :3], path[:, 3:6])
     rate = back @ np.swapaxes(axes, 1, 2)  # (K, 6, 3), of the first state by an acceleration along R, T and N
     total = np.concatenate([np.zeros((1, 6, 3)), np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)[:, None, None], axis=0)])
     flat, span = total.reshape(len(t), -1), float(t[-1] - t[0])

@@ -30,6 +30,11 @@ GROUND_SPEED = 465.0  # m/s that a place on the equator moves: what a second of 
 UT1_DRIFT = 1e-3  # s/day by which UT1 may part from its last known rate, from the record since 1962
 
 
+_POINT, _MINUS, _DIGIT = ord("."), 1, 2
+_KIND = np.full(256, 3, dtype=np.uint8)  # of characters, in the order that they have in a number: blank, minus, digit; no other
+_KIND[ord(" ")], _KIND[ord("-")], _KIND[ord("0") : ord("9") + 1] = 0, _MINUS, _DIGIT
+
+
 class EOPWarning(UserWarning):
     """The orientation of the Earth is not known at this date, or only predicted."""
 
@@ -199,12 +204,33 @@ def _number(cell: bytes) -> bool:
     return True
 
 
-def _columns(rows: list[tuple[int, bytes]], spans: tuple[tuple[int, int], ...], path: Path) -> Array:
-    """Numbers in fixed columns of numbered lines, (D, columns)."""
+def _raw(lines: list[bytes]) -> Array:
+    """Characters of lines, (D, longest), with zeros behind short ones."""
+    return np.array(lines, dtype=bytes).view(np.uint8).reshape(len(lines), -1)
+
+
+def _columns(raw: Array, numbers: Array, spans: tuple[tuple[int, int], ...], path: Path) -> Array:
+    """Numbers in fixed columns of lines, (D, columns); messages name the lines by their numbers in the file."""
+    return np.stack([_decimals(raw[:, a:b], numbers, path) for a, b in spans], axis=1)
+
+
+def _decimals(cells: Array, numbers: Array, path: Path) -> Array:
+    """One column of numbers, (D,): in all bits what `float` makes of each cell."""
+    if not len(cells):
+        return np.zeros(0)
+    at = int(np.argmax((cells == _POINT).all(axis=0)))
+    rest = np.delete(cells, at, axis=1)
+    kind = _KIND[rest]
+    # blanks, at most one minus, digits, the point in one place: whole numbers below 2^53 over a power of ten, rounded once
+    ordered = at and (np.diff(kind.astype(np.int8)) >= 0).all() and (kind[:, -1] == _DIGIT).all()
+    if ordered and ((kind == _MINUS).sum(axis=1) < 2).all():
+        whole = np.where(kind == _DIGIT, rest - ord("0"), 0) @ 10.0 ** np.arange(rest.shape[1])[::-1]
+        return np.asarray(np.where((kind == _MINUS).any(axis=1), -1.0, 1.0) * whole / 10.0 ** (rest.shape[1] - at))
+    texts = [bytes(cell).rstrip(b"\0") for cell in cells]
     try:
-        return np.array([[float(line[a:b]) for a, b in spans] for _, line in rows])
+        return np.array([float(text) for text in texts])
     except ValueError:
-        number, cell = next((n, line[a:b]) for n, line in rows for a, b in spans if not _number(line[a:b]))
+        number, cell = next((n, text) for n, text in zip(numbers.tolist(), texts, strict=True) if not _number(text))
         raise ValueError(f"{path.name}, line {number}: {cell.decode('ascii', 'replace').strip()!r} is not a number") from None
 
 
@@ -220,23 +246,23 @@ def _table(values: Array, path: Path, measured: float, dxdy_unit: float) -> EOPT
 
 
 def _c04(lines: list[bytes], path: Path) -> EOPTable:
-    rows = [(n, line) for n, line in enumerate(lines, 1) if line[:4].isdigit()]
-    if rows and len(rows[0][1]) < 150:
-        raise ValueError(f"{path.name}, line {rows[0][0]}: a row of EOP C04 has at least 150 characters")
-    values = _columns(rows, ((16, 26), (26, 38), (38, 50), (50, 62), (62, 74), (74, 86)), path)
+    raw = _raw(lines)
+    rows = np.flatnonzero((raw[:, :4] - ord("0") < 10).all(axis=1))
+    if len(rows) and len(lines[rows[0]]) < 150:
+        raise ValueError(f"{path.name}, line {rows[0] + 1}: a row of EOP C04 has at least 150 characters")
+    values = _columns(raw[rows], rows + 1, ((16, 26), (26, 38), (38, 50), (50, 62), (62, 74), (74, 86)), path)
     return _table(values, path, float(values[-1, 0]) if len(values) else np.nan, 1.0)
 
 
 def _finals(lines: list[bytes], path: Path) -> EOPTable:
-    rows = [(n, line) for n, line in enumerate(lines, 1) if line[58:68].strip()]
-    # offsets of the celestial pole are not predicted as far as UT1: none is taken there
-    filled = [
-        (n, line[:97] + (line[97:106].strip() or b"0").rjust(9) + line[106:116] + (line[116:125].strip() or b"0").rjust(9))
-        for n, line in rows
-    ]
-    values = _columns(filled, ((7, 15), (18, 27), (37, 46), (58, 68), (97, 106), (116, 125)), path)
-    measured = [float(line[7:15]) for _, line in rows if line[57:58] == b"I"]
-    return _table(values, path, max(measured, default=np.nan), 1e-3)
+    raw = _raw(lines)
+    rows = np.flatnonzero((raw[:, 58:68] > ord(" ")).any(axis=1))
+    raw = raw[rows]
+    for a, b in ((97, 106), (116, 125)):  # offsets of the pole are not predicted as far as UT1: none is taken there
+        raw[~(raw[:, a:b] > ord(" ")).any(axis=1), a:b] = np.frombuffer(b"0.000".rjust(b - a), np.uint8)
+    values = _columns(raw, rows + 1, ((7, 15), (18, 27), (37, 46), (58, 68), (97, 106), (116, 125)), path)
+    measured = values[raw[:, 57] == ord("I"), 0]
+    return _table(values, path, float(measured.max()) if len(measured) else np.nan, 1e-3)
 
 
 @cache

@@ -8,7 +8,6 @@ import re
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 
 from piazzi.earth.stations import Coordinates, Station, StationList
@@ -68,6 +67,8 @@ def _of_json(path: Path, text: str) -> Iterator[_Row]:
 
 def mpc_date() -> str | None:
     """The date of the list that is installed, as its package's version says it; None without."""
+    from importlib.metadata import version
+
     try:
         return "-".join(part.zfill(2) for part in version(LIST).split(".")[:3])
     except ImportError:

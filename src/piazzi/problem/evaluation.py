@@ -15,7 +15,7 @@ from piazzi.kernels.apart import Apart
 from piazzi.kernels.bundle import Given
 from piazzi.kernels.spec import outside_fragments
 from piazzi.model import Model
-from piazzi.model.functions import ROOT, STATION
+from piazzi.model.functions import ROOT, STATION, STATION_TABLE
 from piazzi.model.values import with_values
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.parts import Station
@@ -134,7 +134,10 @@ def singular_equation(
 
 
 def _unlike(stations: Iterable[Station]) -> Iterable[Station]:
-    """Stations without those that have the place, the sensor and the numbers of one before, as blocks of a pass may have."""
+    """Stations without those that have the place, the sensor and the numbers of one before, as blocks of a pass have.
+
+    Which table of kernels' data its place is, is a number of each, and none that an equation is evaluated with.
+    """
     found: dict[Any, Station] = {}
     for station in stations:
         place: Any = station.place
@@ -142,7 +145,8 @@ def _unlike(stations: Iterable[Station]) -> Iterable[Station]:
             hash(place)
         except TypeError:
             place = id(place)
-        found.setdefault((station.sensor, place, tuple(dict(station.numbers).items())), station)
+        own = tuple((name, number) for name, number in dict(station.numbers).items() if name != STATION_TABLE)
+        found.setdefault((station.sensor, place, own), station)
     return found.values()
 
 
