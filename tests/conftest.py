@@ -1,6 +1,7 @@
 """Surroundings of every test: a kernel cache of its own, and the recordings that the project does not contain."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,16 @@ for name in ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "PIAZZI_DEBUG", "PYT
 # same examples.
 settings.register_profile("piazzi", deadline=None, derandomize="CI" in os.environ, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("piazzi")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_by_whoever_needs_them():
+    """No processes that compile ahead: each imports for seconds before it begins, and tests keep all processors busy anyway."""
+    from piazzi.kernels import ahead
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ahead, "DEAR", sys.maxsize)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -21,6 +21,7 @@ def specs(tmp_path, monkeypatch):
     monkeypatch.setenv("PIAZZI_CACHE", str(tmp_path))
     monkeypatch.delenv("PIAZZI_JIT", raising=False)
     monkeypatch.setattr(ahead, "processors", lambda: 2)
+    monkeypatch.setattr(ahead, "DEAR", 2)
     monkeypatch.setattr(ahead, "ANY", 2)
     for remembered in (folder.private_folder, folder.writable_folder):
         remembered.cache_clear()
