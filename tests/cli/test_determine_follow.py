@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 import piazzi as pz
+from piazzi.cli.determine import _row_by_row
+from piazzi.determination.case import Case
 from tests.determination.fixing import EPOCH, truth
 from tests.waiting import HANGS, until
 
@@ -163,3 +165,14 @@ def test_what_a_stream_leaves_open_is_asked_for(tmp_path, text, status, says):
     done = refused(tmp_path, "-", "--follow", text=text)
     assert done.returncode == status and says in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
     assert done.stdout == "" and not Path(tmp_path, "last.oem").exists()
+
+
+def test_a_case_of_whole_runs_is_followed_by_what_goes_row_by_row(capsys):
+    for given, kept, said in (
+        (("graph",), None, "followed by ekf:gate, not by graph of the case"),
+        (("graph", "window:6h", "ekf"), ("window:6h",), "followed by window:6h, not by graph, ekf of the case"),
+        (("ukf",), ("ukf",), ""),
+        (None, None, ""),
+    ):
+        assert _row_by_row(Case(with_=given)).with_ == kept
+        assert said in capsys.readouterr().err

@@ -68,7 +68,7 @@ def command(files: tuple[str, ...], **given: Any) -> int:
     if case.follow and case.show:
         raise click.UsageError("--follow and --show do not go together", click.get_current_context())
     if case.follow:
-        return _follow(files, case)
+        return _follow(files, case if given["with_"] else _row_by_row(case))
     status = DONE
     for one in objects_in(files, case) if case.each else [case.object]:
         own = replace(case, object=one)
@@ -88,6 +88,19 @@ def command(files: tuple[str, ...], **given: Any) -> int:
         status = max(status, _status(result, case.strict))
         _print(result, case, wrote)
     return status
+
+
+def _row_by_row(case: Case) -> Case:
+    """The case with those of its estimators that go row by row, the first of them; with the usual one where none does."""
+    from piazzi.determination.fit import estimators
+
+    if not case.with_:
+        return case
+    able = [name for name, one in estimators(case.with_).items() if callable(getattr(one, "start", None))][:1]
+    others = [name for name in estimators(case.with_) if name not in able]
+    if others:
+        say(f"followed by {able[0] if able else 'ekf:gate'}, not by {', '.join(others)} of the case (--with says otherwise)")
+    return replace(case, with_=tuple(able) or None)
 
 
 def _follow(files: Sequence[str], case: Case) -> int:

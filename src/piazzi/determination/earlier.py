@@ -182,7 +182,7 @@ def _inflated(facts: Mapping[str, Any], name: str) -> tuple[float, tuple[str, ..
         honest = facts["verdict"]["honest"]
         factor = float(honest["figure"])
         if honest["ok"] is False and factor > 1.0:
-            return factor, (f"sigmas of {name} are taken {factor:.3g} times as large, as its residuals were",)
+            return factor, (f"sigmas of {name} are taken {factor:.3g} times as large, as its verdict found errors",)
     return 1.0, ()
 
 

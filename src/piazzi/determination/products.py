@@ -148,9 +148,9 @@ def comments(found: Any, formal: bool | None = None) -> Iterator[str]:
         yield sentence.sentence
     factor = inflation(found)
     if factor > 1.0 and is_formal(found, formal):
-        yield f"Covariances are those of the fit, though residuals are {factor:.3g} times their sigmas."
+        yield f"Covariances are those of the fit, though the verdict finds errors {factor:.3g} times as large as they say."
     elif factor > 1.0:
-        yield f"Covariances are those of the fit times {factor**2:.3g}: residuals are {factor:.3g} times their sigmas."
+        yield f"Covariances are those of the fit times {factor**2:.3g}: the verdict finds errors {factor:.3g} times as large."
     if found.notes.get("command"):
         yield f"Made by: {found.notes['command']}"
     made_of = used_by(document(found))
