@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.model.functions import Signature
 from piazzi.outside.evaluation import check_count, checksum, derivatives, value
 from piazzi.outside.pieces import Pieces
-
-Array = np.ndarray[Any, Any]
 
 # height (km), least and largest density (g/km^3)
 TABLE = np.array([

@@ -15,12 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import scales
 from piazzi.earth.epoch import Epoch, pairs
 from piazzi.earth.finding import check_kernel
 from piazzi.text import nearest
-
-Array = np.ndarray[Any, Any]
 
 
 class EphemerisWarning(UserWarning):

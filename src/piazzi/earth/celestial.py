@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth.bodies import asteroid, body
 from piazzi.earth.constants import GM, SPEED_OF_LIGHT
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.tabulated import Tabulated, in_tdb
 from piazzi.outside.evaluation import checksum
-
-Array = np.ndarray[Any, Any]
 
 
 @dataclass(frozen=True)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import scales
 from piazzi.earth.dates import Reading, read_date
 from piazzi.earth.epoch import Epoch, orientation
 from piazzi.text import shown
-
-Array = np.ndarray[Any, Any]
 
 _DIGITS = (0, 1, 2, 3, 5, 6, 8, 9, 11, 12, 14, 15, 17, 18)  # of 2016-02-13T16:00:00
 _MARKS = ((4, b"-"), (7, b"-"), (13, b":"), (16, b":"))

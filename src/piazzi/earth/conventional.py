@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth.eop import ARCSEC, SECULAR_POLE
-
-Array = np.ndarray[Any, Any]
 
 # Table 6.2: values of 2000.0 and rates per year; that of C20 is zero-tide
 C20, C20_RATE, C30_RATE, C40_RATE = -0.48416948e-3, 11.6e-12, 4.9e-12, 4.7e-12

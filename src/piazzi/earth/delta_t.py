@@ -7,11 +7,9 @@ The polynomials of F. Espenak and J. Meeus, "Five Millennium Canon of Solar Ecli
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from piazzi.arrays import Array
 
 MODEL = "Espenak and Meeus 2006"
 FIRST_YEAR, LAST_YEAR = 1600.0, 1986.0

@@ -11,18 +11,16 @@ import warnings
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import scales
 from piazzi.earth.delta_t import MODEL, delta_t, delta_t_error
 from piazzi.earth.finding import found
 from piazzi.earth.scales import Pole
 from piazzi.opening import opened
 from piazzi.text import brief
-
-Array = np.ndarray[Any, Any]
 
 ARCSEC = np.pi / 648000.0
 SECULAR_POLE = ((0.0550, 0.001677), (0.3205, 0.003460))  # x and y in 2000.0 (") and per year: IERS Conventions, update of 2018

@@ -12,16 +12,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth.conventional import SOURCE, conventional
 from piazzi.earth.epoch import Epoch
 from piazzi.opening import opened
 from piazzi.text import brief
-
-Array = np.ndarray[Any, Any]
 
 PACKAGED = ("EGM2008", "IERS2010")
 HIGHEST_DEGREE = 2190

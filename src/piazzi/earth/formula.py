@@ -7,12 +7,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
+from piazzi.arrays import Array
 from piazzi.expressions.numeric import evaluate_arrays
 from piazzi.text import brief
-
-Array = np.ndarray[Any, Any]
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,15 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth.fields import GravityField, gravity_field
 from piazzi.model.functions import Signature
 from piazzi.outside.evaluation import aligned, check_count, checksum, derivatives, value
 from piazzi.text import brief
 
-Array = np.ndarray[Any, Any]
 SIGNATURE = Signature("gravity", 3, 3, tuple((i, j) for i in range(3) for j in range(3)))
 MOST = 720  # beyond, unscaled Legendre functions and powers of the cosine of the latitude leave the range of doubles
 _HEADER, _ROW, _LANES = 8, 32, 8

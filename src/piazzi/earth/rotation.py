@@ -18,16 +18,14 @@ Sources: IERS Conventions 2010, ch. 5; ERFA does the series.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import scales
 from piazzi.earth.eop import tables
 from piazzi.earth.epoch import Epoch, pairs
 from piazzi.earth.scales import Orientation
-
-Array = np.ndarray[Any, Any]
 
 FRAMES = ("GCRF", "ICRF", "EME2000", "MOD", "TOD", "MOD_1976", "TOD_1980", "CIRS", "TEME", "PEF", "ITRF")
 TURNING = ("ITRF", "PEF")

@@ -11,11 +11,11 @@ Sources: IERS Conventions 2010, ch. 10 (TT, TCG, TDB); IAU SOFA Time Scale and C
 from __future__ import annotations
 
 import warnings
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from piazzi.arrays import Array
 
 SCALES = ("UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1")
 DAY = 86400.0

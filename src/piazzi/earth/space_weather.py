@@ -6,16 +6,15 @@ import datetime as dt
 import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth.eop import mjd_text
 from piazzi.earth.epoch import Epoch
 from piazzi.opening import opened
 from piazzi.text import brief
-
-Array = np.ndarray[Any, Any]
 
 OBSERVED, PREDICTED, MONTHLY = 0, 1, 2
 QUIET_AP = 15.0  # where a prediction has none: its mean over solar cycles

@@ -13,11 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth.epoch import Epoch, pairs
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
 from piazzi.text import brief, nearest
-
-Array = np.ndarray[Any, Any]
 
 YEAR = 365.25 * 86400.0  # s, the year of velocities in SINEX
 LOWEST, HIGHEST = -550.0, 9000.0  # m above the ellipsoid: below the Dead Sea and above the Himalaya

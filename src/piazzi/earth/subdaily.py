@@ -15,16 +15,14 @@ with exact rates.  Angles turn with the Earth and are taken at UT1; at TT instea
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import scales
 from piazzi.earth.eop import ARCSEC, tables
 from piazzi.earth.scales import Orientation, Pole
 from piazzi.text import brief
-
-Array = np.ndarray[Any, Any]
 
 _EPOCH = 37076.5  # MJD that phases of the potential are for
 _DELAY = 2.0  # days between the values of the potential that orthotides are made of

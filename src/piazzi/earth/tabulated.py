@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import scales
 from piazzi.earth.bodies import body
 from piazzi.earth.epoch import Epoch, pairs
@@ -29,7 +30,6 @@ from piazzi.outside.evaluation import check_count, checksum, derivatives, value
 from piazzi.outside.pieces import Pieces, fitted
 from piazzi.text import brief
 
-Array = np.ndarray[Any, Any]
 DAY = scales.DAY
 DAYS = (
     8192  # that are kept, of all tables: years of a problem with a few, at most 10 kB each; fewer, and none would be met again

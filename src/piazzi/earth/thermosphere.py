@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import gravity_field
 from piazzi.earth.geodetic import position_to_geodetic
@@ -23,7 +24,6 @@ from piazzi.earth.tabulated import DAY, Tabulated
 from piazzi.outside.evaluation import checksum
 from piazzi.text import brief
 
-Array = np.ndarray[Any, Any]
 SCALE_HEIGHTS = 3.0
 REMAKE = 0.2  # scale heights by which an orbit may leave the arc before the table is made again
 VERSION = 2.1

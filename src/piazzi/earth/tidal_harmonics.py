@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import scales
 from piazzi.earth.bodies import body
 from piazzi.earth.constants import GM, LOVE_K2, LOVE_K21, LOVE_K22
@@ -23,8 +24,6 @@ from piazzi.earth.scales import Orientation
 from piazzi.earth.tabulated import DAY, Tabulated, orientation_key
 from piazzi.earth.tides import RADIUS, wobble
 from piazzi.outside.evaluation import checksum
-
-Array = np.ndarray[Any, Any]
 
 # Tables 6.5b, a, c: multiples of the arguments l, l', F, D, Omega; then 1e-12 in phase and out of phase
 _ZONAL = np.array([

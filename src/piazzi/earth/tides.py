@@ -7,18 +7,16 @@ as the conventions have it.  Loading by the ocean and the air is left out.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import scales
 from piazzi.earth.bodies import body
 from piazzi.earth.eop import ARCSEC, SECULAR_POLE, decimal_year, tables
 from piazzi.earth.epoch import Epoch, pairs
 from piazzi.earth.rotation import rotation
 from piazzi.earth.scales import Orientation
-
-Array = np.ndarray[Any, Any]
 
 # IERS Conventions 2010, 7.1.1: the Earth's radius (m), masses of Sun and Moon in masses of the Earth, Love and Shida numbers
 RADIUS = 6378136.6

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from functools import cache
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.formula import Formula
-
-Array = np.ndarray[Any, Any]
 
 saastamoinen = Formula(
     ("latitude", "height", "pressure", "temperature", "vapour"),

@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from piazzi.earth.formula import Formula
-
-Array = np.ndarray[Any, Any]
 
 # Saturation pressure and enhancement factor: Davis 1992, Metrologia 29 (CIPM), as in the IERS Conventions 2010, 9.1
 vapour_pressure = Formula(

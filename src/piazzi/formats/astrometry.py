@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.formats.conventions import Conventions, with_usual_sigmas
-from piazzi.formats.observations import Array, Observations
+from piazzi.formats.observations import Observations
 
 NIGHT = 28800.0  # s without a row after which a station begins another night
 FULL = 4  # rows of a night that count fully

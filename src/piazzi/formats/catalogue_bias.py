@@ -14,7 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from piazzi.formats.observations import Array, Observations
+from piazzi.arrays import Array
+from piazzi.formats.observations import Observations
 from piazzi.formats.source import read_bytes
 
 CATALOGUES = tuple("abcdegijlmnopqrtuvwLNQRSUY")  # of the file, by the Minor Planet Center's letters

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from piazzi.arrays import Array
 
 CHUNK = 2**20  # bytes of lines that are taken at once: what is made of them stays in the caches, and small
 LONGEST = 64

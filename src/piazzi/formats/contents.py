@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.formats.kinds import KINDS, TAGS
-from piazzi.formats.observations import Array, Observations, Segment
+from piazzi.formats.observations import Observations, Segment
 from piazzi.formats.passes import numbered
 
 SCHEMA = "piazzi.tracking/1"

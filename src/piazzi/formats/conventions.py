@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth.scales import SCALES
 from piazzi.formats.frames import KNOWN, frame_named, settled
 from piazzi.formats.kinds import ANGLES, KINDS, TAGS
-from piazzi.formats.observations import Array, Observations, Segment
+from piazzi.formats.observations import Observations, Segment
 from piazzi.formats.range_units import in_metres, range_unit_of
 from piazzi.tables.names import parse_columns
 from piazzi.text import brief, nearest, suggest

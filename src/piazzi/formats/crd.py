@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch
 from piazzi.earth.scales import UTC_BEGINS
 from piazzi.formats.conventions import Conventions, with_usual_sigmas
@@ -21,7 +22,6 @@ from piazzi.formats.dates import Readings, instants
 from piazzi.formats.kinds import TAGS
 from piazzi.formats.observations import Correction, Observations, Segment
 
-Array = np.ndarray[Any, Any]
 C = 299792458.0  # m/s
 SIGMA = {"normal points": 0.03, "full rate": 0.05, "sampled engineering": 0.05}  # m, where the file gives none
 _DAY = 86400.0

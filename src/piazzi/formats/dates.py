@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch, scales
-
-Array = np.ndarray[Any, Any]
 
 
 class Readings(NamedTuple):

@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch
 from piazzi.formats.copying import reduced
 from piazzi.text import brief, one_line
-
-Array = np.ndarray[Any, Any]
 
 
 class Burn(NamedTuple):

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.formats.conventions import Conventions, with_usual_sigmas
 from piazzi.formats.ephemeris import Arc, Ephemeris
 from piazzi.formats.joining import concatenate
 from piazzi.formats.observations import Observations, Segment
 
-Array = np.ndarray[Any, Any]
 POSITION, VELOCITY = ("x", "y", "z"), ("vx", "vy", "vz")
 
 

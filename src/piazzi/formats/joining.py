@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.formats.observations import NUMBERS, Array, Observations, is_constant
+from piazzi.arrays import Array
+from piazzi.formats.observations import NUMBERS, Observations, is_constant
 
 
 def concatenate(parts: Iterable[Observations]) -> Observations:

@@ -9,12 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch
 from piazzi.formats.copying import reduced
 from piazzi.formats.kinds import KINDS, TAGS
 from piazzi.text import brief, listed, nearest
-
-Array = np.ndarray[Any, Any]
 
 
 class Correction(NamedTuple):

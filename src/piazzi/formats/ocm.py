@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.ephemeris import Arc, Ephemeris
@@ -16,7 +17,6 @@ from piazzi.formats.frames import frame_named
 from piazzi.formats.ndm import Item, Source, key_value, lines_of, needed, shown, single
 from piazzi.formats.odm import centre_named, in_si, unknown_axes
 
-Array = np.ndarray[Any, Any]
 _MARK = re.compile(r"(META|TRAJ|PHYS|COV|MAN|PERT|OD|USER)_(START|STOP)")
 _STATES = {"CARTP": 3, "CARTPV": 6, "CARTPVA": 9}
 _COLUMNS = ("km",) * 3 + ("km/s",) * 3 + ("km/s**2",) * 3

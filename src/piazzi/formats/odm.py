@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch
 from piazzi.earth.scales import UTC_BEGINS
 from piazzi.formats.dates import instants, read_dates
@@ -17,7 +18,6 @@ from piazzi.formats.ndm import Item, Source, known, needed, shown, single
 from piazzi.formats.odm_keywords import COVARIANCE, OEM_META, SPACECRAFT
 from piazzi.units import Units
 
-Array = np.ndarray[Any, Any]
 _POWERS = str.maketrans({"×": "*", "·": "*", "²": "**2", "³": "**3", "⁴": "**4", "⁻": "**-", "¹": "1"})
 
 

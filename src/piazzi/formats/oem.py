@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.formats.columns import chunks, read_numbers
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.ephemeris import Arc, Ephemeris
@@ -16,7 +17,6 @@ from piazzi.formats.odm import Block, arc_of, metadata_of, one_system, unknown_a
 from piazzi.formats.odm_keywords import HEADER
 from piazzi.formats.source import plain_lines
 
-Array = np.ndarray[Any, Any]
 _MARK = re.compile(rb"^[ \t]*(META_START|META_STOP|COVARIANCE_START|COVARIANCE_STOP)[ \t]*$", re.MULTILINE)
 _STATE = "a state is a date and six or nine numbers"
 

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.formats.observations import Observations
 from piazzi.text import brief, nearest
-
-Array = np.ndarray[Any, Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.formats.conventions import WORDS, Conventions, with_conventions
 from piazzi.formats.kinds import KINDS
-from piazzi.formats.observations import Array, Observations, Segment
+from piazzi.formats.observations import Observations, Segment
 from piazzi.formats.table_header import FIX, LATITUDE, PEOPLE, SIGMA, WEATHER, Header, content_of
 from piazzi.formats.table_times import clocks
 from piazzi.tables.cells import Cells, cells_of

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch
 from piazzi.earth.columns import Instants, read_dates, read_weeks
 from piazzi.earth.epoch import orientation
 from piazzi.earth.scales import DAY, to_tt
 from piazzi.formats.conventions import Conventions
-from piazzi.formats.observations import Array
 from piazzi.tables.cells import PAST, TIME, Cells
 from piazzi.tables.names import SECONDS, WEEK, parts
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.formats.columns import Chunk, chunks
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.markup import Element, walk
@@ -16,8 +16,6 @@ from piazzi.formats.source import plain_lines
 from piazzi.formats.tdm_keywords import HEADER
 from piazzi.formats.tdm_rows import Rows
 from piazzi.formats.tdm_segment import meaning_of
-
-Array = np.ndarray[Any, Any]
 
 _MARK = re.compile(rb"^[ \t]*(META_START|META_STOP|DATA_START|DATA_STOP)[ \t]*$", re.MULTILINE)
 _LINE = "a line of data is KEYWORD = date value"

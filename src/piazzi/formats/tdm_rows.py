@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch
 from piazzi.earth.scales import UTC_BEGINS
 from piazzi.formats.columns import coded, read_numbers
@@ -17,7 +18,6 @@ from piazzi.formats.observations import Observations, Segment
 from piazzi.formats.tdm_open import assumed_of, open_of
 from piazzi.formats.tdm_segment import Meaning, Row, check_texts
 
-Array = np.ndarray[Any, Any]
 _COLUMNS = {"t": np.float64, "value": np.float64, "kind": np.int16, "participant": np.int16, "line": np.int32}
 
 

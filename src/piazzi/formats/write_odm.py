@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.formats.ephemeris import Arc, Ephemeris, MeanElements
 from piazzi.formats.odm_keywords import COVARIANCE, ELEMENTS, SPACECRAFT, STATE, TLE
-from piazzi.formats.writing import Array, date, dates, in_unit, now, number, plain
+from piazzi.formats.writing import date, dates, in_unit, now, number, plain
 from piazzi.units import Units
 
 _LOWER = np.tril_indices(6)

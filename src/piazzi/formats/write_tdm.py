@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.formats.kinds import TAGS
-from piazzi.formats.observations import Array, Observations, Segment
+from piazzi.formats.observations import Observations, Segment
 from piazzi.formats.tdm_keywords import ANGLE_KINDS, CORRECTIONS, DEGREE, LIGHT, METADATA, OF_PARTICIPANT, PLAIN, RANGE_FACTORS
 from piazzi.formats.writing import dates, in_unit, now, plain
 

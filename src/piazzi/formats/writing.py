@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch, scales
-
-Array = np.ndarray[Any, Any]
 
 
 def in_unit(values: Any, factor: float, offset: float = 0.0) -> Array:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from piazzi.arrays import Array
 
 ANOMALIES = ("true", "eccentric", "mean")
 _TERMS = 9  # of the series of x - sin x, to 1e-17 where |x| <= 1

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.orbit.differential import Array, check_mu, motion, states
+from piazzi.arrays import Array
+from piazzi.orbit.differential import check_mu, motion, states
 
 AXES = ("RTN", "TNW", "RTN_rotating", "TNW_rotating")
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import FRAMES, Epoch, rotation
 from piazzi.orbit.axes import orbit_axes
-from piazzi.orbit.differential import Array
 from piazzi.orbit.paths import Path, first_date, opened, path_of
 from piazzi.text import brief
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from piazzi.arrays import Array
 
 
 class Motion(NamedTuple):

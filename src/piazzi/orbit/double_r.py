@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.orbit.anomalies import from_true
-from piazzi.orbit.differential import Array
 from piazzi.orbit.initial import InitialOrbit, Three, three_directions
 
 STARTS = (0.3, 0.6, 1.05, 1.3, 1.7, 2.3, 3.3, 4.5, 6.6, 10.0)  # distances from the centre, in those of the observer

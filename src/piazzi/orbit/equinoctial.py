@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.orbit.anomalies import check_kind, from_true, to_true, true_partials
-from piazzi.orbit.differential import Array, motion, states
+from piazzi.orbit.differential import motion, states
 from piazzi.orbit.modified_equinoctial import ModifiedEquinoctial
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch, transform
 from piazzi.formats.ephemeris import MeanElements
-from piazzi.orbit.differential import Array
 from piazzi.orbit.equinoctial import Equinoctial
 from piazzi.orbit.mean_elements import MU, sgp4_states
 from piazzi.orbit.paths import opened, path_of

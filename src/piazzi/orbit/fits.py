@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.orbit.library import fit_library
 from piazzi.text import brief
 
-Array = np.ndarray[Any, Any]
 RANGE, RATE, DIRECTION, POSITION = 1, 2, 3, 4
 _ROW = 20  # numbers of a row, as the kernel reads them
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.orbit.differential import Array
+from piazzi.arrays import Array
 from piazzi.orbit.initial import three_positions
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.orbit.differential import Array, check_mu
+from piazzi.arrays import Array
+from piazzi.orbit.differential import check_mu
 from piazzi.orbit.two_body import propagate_kepler
 from piazzi.text import brief
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from piazzi.orbit.differential import Array
+from piazzi.arrays import Array
 
 LAGRANGE = (8, 10, 12, 14, 16)  # rows
 HERMITE = (2, 3, 4, 5, 6, 7, 8)

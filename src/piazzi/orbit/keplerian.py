@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.orbit.anomalies import check_kind, from_true, to_true, true_partials
-from piazzi.orbit.differential import Array, check_mu, differential, motion, states
+from piazzi.orbit.differential import check_mu, differential, motion, states
 
 SIZES = {"a": "semi-major axis", "p": "semi-latus rectum", "q": "distance of the pericentre"}
 _NO_DIGITS = 1e-12  # e or sin i below which a derivative by them is nothing but rounding

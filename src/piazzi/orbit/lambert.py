@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.orbit.differential import Array, check_mu
+from piazzi.arrays import Array
+from piazzi.orbit.differential import check_mu
 from piazzi.orbit.library import orbit_library
 
 NORTH = (0.0, 0.0, 1.0)

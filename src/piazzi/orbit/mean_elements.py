@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch, transform
 from piazzi.formats.ephemeris import MeanElements
 from piazzi.orbit.axes import state_axes
-from piazzi.orbit.differential import Array
 
 MU = 3.986008e14  # m^3/s^2 of WGS 72, which the theory is fitted with
 _DAY = 86400.0

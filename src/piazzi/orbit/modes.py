@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, Fits, Rows, Setting, fitted, squares
 from piazzi.orbit.starts import Moment, Region, classical, linked, moment, sampled
 from piazzi.orbit.two_body import propagate_kepler
 from piazzi.text import brief
 
-Array = np.ndarray[Any, Any]
 BEST = 60  # samples that are fitted
 LONG = 120  # steps of the last fits: along a curved valley
 SAME = 25.0  # squared Mahalanobis distance within which two ends are one

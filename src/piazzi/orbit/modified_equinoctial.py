@@ -17,7 +17,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from piazzi.orbit.differential import Array, check_mu, differential, motion, states
+from piazzi.arrays import Array
+from piazzi.orbit.differential import check_mu, differential, motion, states
 
 # retrograde elements are those of the state turned by half a turn about the first axis, with h and k changed in sign as here
 _TURNED = np.array([1.0, -1.0, -1.0])

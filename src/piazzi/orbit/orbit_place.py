@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch
 from piazzi.earth.tabulated import DAY, Tabulated, with_rates
 from piazzi.model.functions import STATION_TERMS
@@ -15,8 +16,6 @@ from piazzi.orbit.two_body import propagate_kepler
 from piazzi.outside.evaluation import checksum
 from piazzi.outside.pieces import Pieces
 from piazzi.text import brief
-
-Array = np.ndarray[Any, Any]
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch, rotation, transform
 from piazzi.earth.forces import STATES
 from piazzi.earth.rotation import frame_named
 from piazzi.formats import Arc, Ephemeris, read_ephemeris
 from piazzi.formats.ephemeris import MeanElements
 from piazzi.orbit.axes import orbit_axes
-from piazzi.orbit.differential import Array
 from piazzi.orbit.interpolation import interpolated
 from piazzi.orbit.mean_elements import sgp4_states
 

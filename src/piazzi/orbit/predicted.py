@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch
 from piazzi.earth.rotation import frame_named
 from piazzi.formats.ephemeris import Arc, Ephemeris
 from piazzi.orbit.axes import state_axes
-from piazzi.orbit.differential import Array
 from piazzi.orbit.starting import in_axes
 
 

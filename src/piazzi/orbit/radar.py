@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.orbit.differential import Array, check_mu
+from piazzi.arrays import Array
+from piazzi.orbit.differential import check_mu
 from piazzi.orbit.initial import InitialOrbit
 from piazzi.orbit.lambert import NORTH, lambert_all
 from piazzi.orbit.two_body import propagate_kepler

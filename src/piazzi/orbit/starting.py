@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth import Epoch, rotation_rate, transform
 from piazzi.formats.ephemeris import Arc, MeanElements
 from piazzi.formats.ocm import used_by
 from piazzi.orbit.axes import state_axes
-from piazzi.orbit.differential import Array
 from piazzi.orbit.interpolation import interpolated
 from piazzi.orbit.mean_elements import sgp4_covariance, sgp4_states
 from piazzi.orbit.paths import opened

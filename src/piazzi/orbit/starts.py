@@ -10,17 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, RATE, Rows
 from piazzi.orbit.from_directions import gauss
 from piazzi.orbit.gooding import gooding
 from piazzi.orbit.lambert import lambert
 from piazzi.orbit.two_body import propagate_kepler
 
-Array = np.ndarray[Any, Any]
 SAMPLES = {0: 1, 1: 64, 2: 512, 3: 2048, 4: 4096, 5: 8192, 6: 8192}
 LINKED = 4096  # pairs of distances
 SLOW = 2  # triples that the method of Gooding takes: a tenth of a second each

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from piazzi import kernels
+from piazzi.arrays import Array
 from piazzi.kernels.fragments.kepler import kepler_motion, kepler_partials
 from piazzi.orbit.library import orbit_library
 
-Array = np.ndarray[Any, Any]
 MANY = 1000  # states: from here on it pays to load compiled code
 
 

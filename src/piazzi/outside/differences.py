@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from piazzi.arrays import Array
+
 AGREED = 1e-5  # of a derivative
 ROUNDING = 64 * 2.0**-52  # of a value: what rounding in a function may come to
 LONG = 1e-3  # of an argument: shorter steps have too much rounding in them to tell what is zero

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.kernels.build import module_of
 from piazzi.kernels.tables import table_source
 from piazzi.model.functions import Signature
 
-Array = np.ndarray[Any, Any]
 REGISTER = 8  # doubles: blocks are whole ones, so that none lies across two lines of memory
 _PLAIN = "from piazzi.kernels.plain import *\n\n\n"
 

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.model.functions import Signature
 from piazzi.opening import opened
 from piazzi.outside.differences import disagreement
 from piazzi.outside.evaluation import aligned, check_count, checksum, derivatives, numbers, plain_functions, value
 from piazzi.outside.fragment import Fragment, read_fragment
 from piazzi.text import brief
-
-Array = np.ndarray[Any, Any]
 
 
 @dataclass(frozen=True, eq=False)

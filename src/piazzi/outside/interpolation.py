@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.model.functions import Signature
 from piazzi.outside.evaluation import aligned, check_count, checksum, derivatives, numbers, value
 from piazzi.outside.samples import read_columns
 from piazzi.outside.splines import foretold, slopes
 from piazzi.text import brief
 
-Array = np.ndarray[Any, Any]
 OUTSIDE = ("refuse", "clamp")
 _HEADER = 8
 

@@ -6,14 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.kernels.tables import padded
 from piazzi.outside.evaluation import aligned, whole_registers
 
-Array = np.ndarray[Any, Any]
 MOST_PIECES = 1 << 18
 ROUNDING = 2e-14  # of a column's size: less is not asked for
 _HEADER = 8

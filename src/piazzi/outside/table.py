@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.model.functions import Signature
 from piazzi.outside.evaluation import checksum, derivatives, numbers, value
 from piazzi.outside.pieces import ROUNDING, Pieces, pieces_of
 from piazzi.outside.samples import read_columns
 from piazzi.text import brief
 
-Array = np.ndarray[Any, Any]
 TERMS = 12
 _POINTS = (2, 4, 6, 8, 10, 12)
 

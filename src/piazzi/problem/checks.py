@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from piazzi import arrays
+
+Array = arrays.Array
 
 
 def frozen(a: Any) -> Array:

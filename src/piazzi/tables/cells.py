@@ -9,14 +9,13 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.opening import opened
 from piazzi.text import shown
-
-Array = np.ndarray[Any, Any]
 
 STATION = "station"
 TIME = "time"

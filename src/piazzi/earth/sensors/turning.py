@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from piazzi.arrays import Array
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.rotation import frame_named, rotation_rate
 from piazzi.earth.scales import Orientation
 from piazzi.earth.tabulated import DAY, Tabulated, orientation_key
 from piazzi.outside.evaluation import checksum
-
-Array = np.ndarray[Any, Any]
 
 
 @dataclass(frozen=True)
