@@ -44,6 +44,20 @@ def shown(value: Any) -> str:
     return one_line(text if len(text) <= 60 else text[:57] + "...")
 
 
+def counted(many: int, what: str) -> str:
+    """So many of something: ``1 row``, ``2,000 rows``."""
+    return f"{many:,} {what}{'' if many == 1 else 's'}"
+
+
+def is_number(text: str | bytes) -> bool:
+    """Whether Python reads a text as a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def suggestion(name: str, valid: Iterable[object]) -> str:
     """The valid name nearest to `name`, upper and lower case aside, "" where none is near."""
     from difflib import get_close_matches

@@ -15,8 +15,8 @@ from piazzi.problem import Problem
 from piazzi.problem.checks import Array
 
 
-def beliefs(given: Setup, estimate: Estimate, epochs: Sequence[Epoch], factor: float = 1.0) -> tuple[Array, Array]:
-    """States (K, 6) of the GCRF and covariances (K, 6, 6), these times the square of `factor`.
+def beliefs(given: Setup, estimate: Estimate, epochs: Sequence[Epoch]) -> tuple[Array, Array]:
+    """States (K, 6) of the GCRF and covariances (K, 6, 6).
 
     Raises
     ------
@@ -32,7 +32,7 @@ def beliefs(given: Setup, estimate: Estimate, epochs: Sequence[Epoch], factor: f
     for k in np.unique(base):
         own = np.flatnonzero(base == k)
         mean[own], P[own] = _from(given, estimate, int(k), t[own])
-    return mean[:, :6], (P[:, :6, :6] + departure(given, estimate, t)) * factor**2
+    return mean[:, :6], P[:, :6, :6] + departure(given, estimate, t)
 
 
 def _from(given: Setup, estimate: Estimate, k: int, t: Array) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from piazzi.determination.passing import Instant, Passage, passages, span_of
 from piazzi.earth import Epoch, Station
 from piazzi.earth.constants import ASTRONOMICAL_UNIT
 from piazzi.earth.stepping import longest_step
-from piazzi.evaluate.grids import Grid, as_html
+from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.quantities import finite, number
 from piazzi.evaluate.tabled import Tabled
 from piazzi.problem.checks import Array
@@ -22,10 +22,7 @@ from piazzi.text import brief, printable
 from piazzi.units import positive_duration
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     import xarray
-    from rich.console import Console, ConsoleOptions
 
 SCHEMA = "piazzi.ephemeris/1"
 STEP = 60.0  # s
@@ -148,23 +145,13 @@ class Sky(Tabled):
         """What was assumed."""
         return [f"Assumed: {printable(text)}." for text in self.course.assumed]
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterable[Any]:
-        from rich.text import Text
-
-        yield Text(printable(self.heading))
-        yield from super().__rich_console__(console, options)
-
-    def _repr_html_(self) -> str:
-        return as_html(self.grids(), [self.heading, *self.sentences()])
-
-    @property
-    def heading(self) -> str:
+    def headlines(self) -> list[str]:
         """What is seen from where, and what the directions are."""
         on = "" if self.axes == "GCRF" else f" of {self.axes}"
-        return (
+        return [
             f"{self.course.name or 'the object'} from {self.station.name}: {self.angles} right ascension and declination{on}; "
             f"azimuth and elevation without refraction; {self.span[0]} to {self.span[1]}"
-        )
+        ]
 
 
 def ephemeris(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,8 @@ from piazzi.determination.setup import Setup, carried
 from piazzi.determination.verdict import DECISIVE
 from piazzi.earth import Epoch, transform
 from piazzi.estimate.estimator import Estimate
+from piazzi.evaluate.grids import Grid
+from piazzi.evaluate.tabled import Tabled
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.text import listed, one_line
@@ -26,11 +28,10 @@ from piazzi.text import listed, one_line
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
-    from rich.console import Console, ConsoleOptions, RenderResult
 
 
 @dataclass(frozen=True, eq=False)
-class Determination:
+class Determination(Tabled):
     """Result of `determine`.
 
     Attributes
@@ -181,18 +182,28 @@ class Determination:
 
         return states(self, span, step, frame)
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        from piazzi.determination.showing import rich
+    @cached_property
+    def _facts(self) -> Mapping[str, Any]:
+        """What `to_dict` says, worked out once for all that shows it."""
+        return self.to_dict()
 
-        yield from rich(self, console, options)
+    def headlines(self) -> Iterable[str]:
+        """What was determined, and the six sentences."""
+        from piazzi.determination.showing import heading
 
-    def to_latex(self) -> str:
-        """Its tables as LaTeX (booktabs), values rounded by their sigmas."""
-        from piazzi.determination.document import document
+        return heading(self, self._facts)
+
+    def grids(self) -> list[Grid]:
+        """State, elements, residuals, rejected rows."""
         from piazzi.determination.showing import grids
-        from piazzi.evaluate.latex import as_latex
 
-        return as_latex(grids(self, document(self)))
+        return grids(self, self._facts)
+
+    def sentences(self) -> Iterable[str]:
+        """Forces, constants, what was left out and what was assumed."""
+        from piazzi.determination.showing import remarks
+
+        return remarks(self._facts)
 
     def plot(self, ax: Axes | None = None, *, what: str = "residuals", which: str | None = None) -> Axes:
         """Draw it on these axes, or on new ones; returns them.
@@ -224,13 +235,3 @@ class Determination:
         used = f"{int(self.keep.sum())} of {len(self.keep)} rows, by {listed(self.estimates)}"
         said = "determined" if self.determined else f"not determined: {one_line(self.message, 150)}"
         return f"<Determination{named} at {self.epoch}, {used}; {said}>"
-
-    def __str__(self) -> str:
-        from piazzi.evaluate.grids import as_text
-
-        return as_text(self)
-
-    def _repr_html_(self) -> str:
-        from piazzi.determination.showing import html
-
-        return html(self)

@@ -87,8 +87,6 @@ def setup(
     chosen: Chosen,
     guess: Guess,
     *,
-    roles: Mapping[str, str] | None = None,
-    values: Mapping[str, Any] | None = None,
     at: Epoch | None = None,
     earlier: Earlier | None = None,
 ) -> Setup:
@@ -97,7 +95,6 @@ def setup(
     Parameters
     ----------
     measured, chosen, guess : what was measured, forces, where to begin
-    roles, values : of parameters, beside those of the forces or instead of them
     at : when the answer is to stand; default the last row
     earlier : an orbit with its covariance, which is the prior, carried to the first row with process noise
 
@@ -106,7 +103,7 @@ def setup(
     ValueError
         Where they do not fit, or the guess cannot be followed to the measurements.
     """
-    problem = posed(measured, chosen, guess, roles, values)
+    problem = posed(measured, chosen, guess)
     tracking, rows, solution = _with_epoch(measured, at)
     times = tracking.times
     begin = float(times[0]) if earlier is None else earlier.epoch - measured.epoch
@@ -208,17 +205,10 @@ def with_prior(given: Setup, states: Array, covariance: Array) -> Setup:
     return replace(given, problem=replace(given.problem, prior=prior), states=states)
 
 
-def posed(
-    measured: Measured,
-    chosen: Chosen,
-    guess: Guess,
-    roles: Mapping[str, str] | None = None,
-    values: Mapping[str, Any] | None = None,
-) -> Problem:
+def posed(measured: Measured, chosen: Chosen, guess: Guess) -> Problem:
     """The problem, with its prior at the guess."""
-    own = {name: role for name, (role, _) in measured.parameters.items()}
-    every = {**chosen.roles, **own, **(roles or {})}
-    numbers = {**chosen.values, **{name: value for name, (_, value) in measured.parameters.items()}, **(values or {})}
+    every = {**chosen.roles, **{name: role for name, (role, _) in measured.parameters.items()}}
+    numbers = {**chosen.values, **{name: value for name, (_, value) in measured.parameters.items()}}
     air = chosen.choice.air(measured.epoch, guess.state[:6], guess.epoch - measured.epoch)
     extra = chosen.extra
     every |= {p.state: "fixed" for p in extra.processes}  # until they are states

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -11,35 +11,14 @@ from piazzi.determination.document import document
 from piazzi.determination.physical import believed, said_name
 from piazzi.determination.setup import Setup
 from piazzi.determination.verdict import apart_by
-from piazzi.evaluate.grids import Grid, as_html, as_rich
+from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.quantities import display_of, displays, number, with_sigma
 from piazzi.text import printable
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rich.console import Console, ConsoleOptions
 
 MOST_REJECTED = 12
 
 
-def rich(found: Any, console: Console, options: ConsoleOptions) -> Iterable[Any]:
-    """Sentences first, then tables."""
-    from rich.text import Text
-
-    facts = document(found)
-    for line in heading(found, facts):
-        yield Text(printable(line))
-    yield from as_rich(grids(found, facts), [printable(line) for line in remarks(facts)], console, options)
-
-
-def html(found: Any) -> str:
-    """The same for a notebook."""
-    facts = document(found)
-    return as_html(grids(found, facts), [*heading(found, facts), *remarks(facts)])
-
-
-def heading(found: Any, facts: dict[str, Any]) -> Iterator[str]:
+def heading(found: Any, facts: Mapping[str, Any]) -> Iterator[str]:
     """What was determined, and the six sentences, those that are false first."""
     state = "determined" if facts["determined"] else "not determined"
     span = facts["span"]
@@ -48,7 +27,7 @@ def heading(found: Any, facts: dict[str, Any]) -> Iterator[str]:
     yield from (f"  {one['sentence']}" for one in sentences)
 
 
-def grids(found: Any, facts: dict[str, Any]) -> list[Grid]:
+def grids(found: Any, facts: Mapping[str, Any]) -> list[Grid]:
     """State, elements, residuals, rejected rows."""
     tables = [
         _state(facts), *([_elements(facts)] if facts["elements"] else []), *([_beside(facts)] if facts["estimated"] else []),
@@ -62,7 +41,7 @@ def grids(found: Any, facts: dict[str, Any]) -> list[Grid]:
     ]
 
 
-def _state(facts: dict[str, Any]) -> Grid:
+def _state(facts: Mapping[str, Any]) -> Grid:
     rows = []
     shows = displays(facts["units"][:6], [[v] for v in facts["mean"][:6]], [range(3), range(3, 6)])
     for show, name, *numbers in zip(shows, *(facts[k][:6] for k in ("names", "mean", "sigma")), strict=True):
@@ -71,7 +50,7 @@ def _state(facts: dict[str, Any]) -> Grid:
     return Grid(f"State at {facts['epoch']}, {facts['frame']}", ("", "value", "sigma", "unit"), tuple(rows))
 
 
-def _beside(facts: dict[str, Any]) -> Grid:
+def _beside(facts: Mapping[str, Any]) -> Grid:
     rows, found = [], facts["estimated"]
     shows = displays([one["unit"] for one in found], [[one["value"], one["prior_sigma"]] for one in found], [])
     for show, one in zip(shows, found, strict=True):
@@ -84,7 +63,7 @@ def _beside(facts: dict[str, Any]) -> Grid:
     return Grid("Estimated beside it, and what was known before", columns, tuple(rows))
 
 
-def _elements(facts: dict[str, Any]) -> Grid:
+def _elements(facts: Mapping[str, Any]) -> Grid:
     elements, rows = facts["elements"], []
     for name, unit, value, sigma in zip(*(elements[k] for k in ("names", "units", "mean", "sigma")), strict=True):
         show = display_of(unit, [value])
@@ -93,7 +72,7 @@ def _elements(facts: dict[str, Any]) -> Grid:
     return Grid(f"Elements, {elements['frame']}", ("", "value", "sigma", "unit"), tuple(rows))
 
 
-def _residuals(facts: dict[str, Any]) -> Grid:
+def _residuals(facts: Mapping[str, Any]) -> Grid:
     rows, found = [], facts["residuals"]
     kinds = {
         kind: [i for i, one in enumerate(found) if one["component"] == kind] for kind in {one["component"] for one in found}
@@ -113,7 +92,7 @@ def _residuals(facts: dict[str, Any]) -> Grid:
     )
 
 
-def _rejected(facts: dict[str, Any]) -> Grid:
+def _rejected(facts: Mapping[str, Any]) -> Grid:
     shown, many = facts["rejected"][:MOST_REJECTED], len(facts["rejected"])
     rows = []
     for one in shown:
@@ -125,7 +104,7 @@ def _rejected(facts: dict[str, Any]) -> Grid:
     )
 
 
-def _published(facts: dict[str, Any]) -> Grid:
+def _published(facts: Mapping[str, Any]) -> Grid:
     rows = []
     for one in facts["published"]:
         worst = max(abs(value) for value in one["in_sigma"])
@@ -146,7 +125,7 @@ def _estimators(found: Any) -> Grid:
     return Grid("Estimators", ("", "success", "iterations", "apart\n[sigma]", "message"), tuple(rows))
 
 
-def remarks(facts: dict[str, Any]) -> Iterator[str]:
+def remarks(facts: Mapping[str, Any]) -> Iterator[str]:
     """Forces, constants, what was left out and what was assumed."""
     forces = facts["forces"]
     extra = [k for k in ("relativity", "radiation", "drag") if forces[k]]

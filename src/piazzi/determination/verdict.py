@@ -11,7 +11,7 @@ from piazzi.determination.completeness import left_out, words_for
 from piazzi.determination.faults import Faults
 from piazzi.determination.holding import Held
 from piazzi.determination.honesty import believable, explained, honest, unseen
-from piazzi.determination.sentence import Sentence, count_of
+from piazzi.determination.sentence import Sentence
 from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.information import singular
@@ -20,6 +20,7 @@ from piazzi.evaluate.metrics import apart
 from piazzi.evaluate.quantities import number
 from piazzi.orbit import state_axes
 from piazzi.problem.checks import Array
+from piazzi.text import counted
 
 KEYS = ("seen", "alone", "converged", "honest", "agreed", "complete")
 DECISIVE = KEYS[:3]
@@ -121,7 +122,7 @@ def alone(given: Setup) -> Sentence:
     test = f"all orbits that fit, from {given.guess.orbits.starts} starts"
     if others <= UNLIKELY:
         return Sentence(True, others, test, f"Alone: no other orbit that fits has a probability above {UNLIKELY:g}.")
-    more = count_of(len(modes) - 1, "other orbit")
+    more = counted(len(modes) - 1, "other orbit")
     return Sentence(False, others, test, f"Not alone: {more} fit, with a probability of {number(others, 2)} together.")
 
 
@@ -131,7 +132,7 @@ def converged(given: Setup, answer: Estimate, analysis: Analysis | None, keep: A
     if not answer.success:
         return Sentence(False, None, test, f"Not converged: {answer.message}.")
     if analysis is None or answer.view != "delayed" or not given.problem.is_noise_free or "weights" in answer.details:
-        return Sentence(True, None, test, f"Converged: the estimator ended after {count_of(answer.iterations, 'iteration')}.")
+        return Sentence(True, None, test, f"Converged: the estimator ended after {counted(answer.iterations, 'iteration')}.")
     scale = scale_of(given, given.states[0])
     left = analysis.toward(keep, analysis.information(keep, scale), scale)[1]
     if not left <= STILL:
@@ -140,7 +141,7 @@ def converged(given: Setup, answer: Estimate, analysis: Analysis | None, keep: A
         True,
         left,
         test,
-        f"Converged: after {count_of(answer.iterations, 'iteration')} another step would go {number(left, 1)} sigma.",
+        f"Converged: after {counted(answer.iterations, 'iteration')} another step would go {number(left, 1)} sigma.",
     )
 
 

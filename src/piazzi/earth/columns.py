@@ -13,10 +13,9 @@ from piazzi.earth.dates import Reading, read_date
 from piazzi.earth.epoch import Epoch, orientation
 from piazzi.text import shown
 
-_DIGITS = (0, 1, 2, 3, 5, 6, 8, 9, 11, 12, 14, 15, 17, 18)  # of 2016-02-13T16:00:00
-_MARKS = ((4, b"-"), (7, b"-"), (13, b":"), (16, b":"))
 _START = 19  # where decimals and the scale begin
 _MOST_DECIMALS = 15  # which a double holds exactly as a whole number
+_POWERS = np.array([float(10**k) for k in range(_MOST_DECIMALS + 1)])
 _TAIL = 8  # bytes that a scale takes with what is around it
 _MOST_WEEKS = 10_000
 _WEEK = 604800.0  # s
@@ -105,49 +104,75 @@ def _code(known: list[str], kind: str) -> int:
     return known.index(kind)
 
 
+class Usual(NamedTuple):
+    """Which dates have the usual form; day (MJD), hour, minute and second, decimals, their end, and whether they are exact."""
+
+    sound: Array
+    day: Array
+    clock: tuple[Array, Array, Array]
+    fraction: Array
+    end: Array
+    exact: Array
+
+
+def padded(texts: Array) -> Array:
+    """Letters of a column of bytes, (J, letters), with zeros behind them that a date without any end may have its tail in."""
+    size = max(texts.dtype.itemsize, _START) + _TAIL + 1
+    return texts.astype(f"S{size}").view(np.uint8).reshape(len(texts), size)
+
+
+def usual(raw: Array, ordinal: bool = False) -> Usual:
+    """What `padded` letters say as 2016-02-13T16:00:00 or, with a day of the year, 2016-044T16:00:00; decimals may follow."""
+    at = 9 if ordinal else 11  # where the hour stands
+    number = (raw - ord("0")).astype(np.int16)  # of what is no digit, some number beyond 9
+    sound = (raw[:, at - 1] == ord("T")) | (raw[:, at - 1] == ord(" "))
+    marks = {4: "-", at + 2: ":", at + 5: ":"} | ({} if ordinal else {7: "-"})
+    for column in range(at + 8):
+        if column in marks:
+            sound &= raw[:, column] == ord(marks[column])
+        elif column != at - 1:
+            sound &= number[:, column] < 10
+    date = ((0, 4), (5, 3)) if ordinal else ((0, 4), (5, 2), (8, 2))
+    year, *days, hour, minute, second = (
+        sum(number[:, a + i].astype(np.int64) * 10 ** (n - 1 - i) for i in range(n))
+        for a, n in (*date, (at, 2), (at + 3, 2), (at + 6, 2))
+    )
+    month = np.ones_like(year) if ordinal else days[0]
+    sound &= (month >= 1) & (month <= 12) & (year >= 1)
+    day, within = _days(np.where(sound, year, 2000), np.where(sound, month, 1), days[-1], 12 if ordinal else 1)
+    return Usual(sound & within, day, (hour, minute, second), *_decimals(raw, at + 8))
+
+
 def _regular(texts: Array) -> tuple[Array, Array, Array, Array, Array]:
     """Which dates have the usual form and a usual time of day; their day, seconds, fraction, and what stands behind."""
-    J, width = len(texts), texts.dtype.itemsize
-    size = max(width, _START) + _TAIL + 1
-    raw = texts.astype(f"S{size}").view(np.uint8).reshape(J, size)
-    number = (raw - ord("0")).astype(np.int16)  # of what is no digit, some number beyond 9
-    sound = np.ones(J, dtype=bool)
-    for at in _DIGITS:
-        sound &= raw[:, at] - ord("0") < 10
-    for at, mark in _MARKS:
-        sound &= raw[:, at] == mark[0]
-    sound &= (raw[:, 10] == ord("T")) | (raw[:, 10] == ord(" "))
-    year, month, day_of_month, hour, minute, second = (
-        sum(number[:, a + i].astype(np.int64) * 10 ** (n - 1 - i) for i in range(n))
-        for a, n in ((0, 4), (5, 2), (8, 2), (11, 2), (14, 2), (17, 2))
-    )
-    sound &= (hour < 24) & (minute < 60) & (second < 60) & (month >= 1) & (month <= 12) & (year >= 1)
-    day, within = _days(np.where(sound, year, 2000), np.where(sound, month, 1), day_of_month)
-    fraction, end, short = _decimals(raw, width)
-    tail = np.take_along_axis(raw, end[:, None] + np.arange(_TAIL), axis=1)
-    rest = np.ascontiguousarray(tail).view(np.uint64).reshape(J)
-    sound &= within & short & (end + _TAIL >= width)
-    return sound, day, (3600 * hour + 60 * minute + second).astype(float), fraction, rest
+    raw = padded(texts)
+    found = usual(raw)
+    hour, minute, second = found.clock
+    tail = np.take_along_axis(raw, found.end[:, None] + np.arange(_TAIL), axis=1)
+    rest = np.ascontiguousarray(tail).view(np.uint64).reshape(len(texts))
+    sound = found.sound & (hour < 24) & (minute < 60) & (second < 60) & found.exact
+    sound &= found.end + _TAIL >= texts.dtype.itemsize
+    return sound, found.day, (3600 * hour + 60 * minute + second).astype(float), found.fraction, rest
 
 
-def _days(year: Array, month: Array, day: Array) -> tuple[Array, Array]:
-    """Modified Julian Days of calendar dates, and which of them there are."""
-    months = ((year - 1970) * 12 + month - 1).astype("datetime64[M]")
-    first, after = (m.astype("datetime64[D]").astype(np.int64) for m in (months, months + 1))
+def _days(year: Array, month: Array, day: Array, months: int) -> tuple[Array, Array]:
+    """Modified Julian Days of days from the first of a month on, and which are within so many months from there."""
+    begin = ((year - 1970) * 12 + month - 1).astype("datetime64[M]")
+    first, after = (m.astype("datetime64[D]").astype(np.int64) for m in (begin, begin + months))
     return (first + day - 1).astype(float) + _ZERO_UNIX, (day >= 1) & (day <= after - first)
 
 
-def _decimals(raw: Array, width: int) -> tuple[Array, Array, Array]:
-    """Decimals of the seconds, where they end, and which of them are few enough to be exact."""
-    mark = (raw[:, _START] == ord(".")) | (raw[:, _START] == ord(","))
+def _decimals(raw: Array, start: int) -> tuple[Array, Array, Array]:
+    """Decimals of the seconds, where they end, and which of them are few enough to be exact; others are cut."""
+    mark = (raw[:, start] == ord(".")) | (raw[:, start] == ord(","))
     inside, value, count = mark.copy(), np.zeros(len(raw), dtype=np.int64), np.zeros(len(raw), dtype=np.int64)
-    for at in range(_START + 1, min(width, _START + 1 + _MOST_DECIMALS)):
+    for at in range(start + 1, raw.shape[1]):
         digit = raw[:, at] - ord("0")
         inside &= digit < 10
         if not inside.any():
             break
-        value = np.where(inside, 10 * value + digit, value)
+        if at <= start + _MOST_DECIMALS:
+            value = np.where(inside, 10 * value + digit, value)
         count += inside
-    end = _START + count + mark
-    more = np.take_along_axis(raw, end[:, None], axis=1)[:, 0] - ord("0") < 10
-    return value / 10.0**count, end, ~more & (~mark | (count > 0))
+    exact = np.where(mark, (count > 0) & (count <= _MOST_DECIMALS), raw[:, start] - ord("0") >= 10)
+    return value / _POWERS[np.minimum(count, _MOST_DECIMALS)], start + count + mark, exact

@@ -20,7 +20,7 @@ from piazzi.earth.delta_t import MODEL, delta_t, delta_t_error
 from piazzi.earth.finding import found
 from piazzi.earth.scales import Pole
 from piazzi.opening import opened
-from piazzi.text import brief
+from piazzi.text import brief, is_number
 
 ARCSEC = np.pi / 648000.0
 SECULAR_POLE = ((0.0550, 0.001677), (0.3205, 0.003460))  # x and y in 2000.0 (") and per year: IERS Conventions, update of 2018
@@ -189,17 +189,9 @@ def read_eop(path: str | Path) -> EOPTable:
         lines = file.read().splitlines()
     if any(b"C04" in line for line in lines[:20]):
         return _c04(lines, path)
-    if lines and len(lines[0]) >= 187 and _number(lines[0][7:15]):
+    if lines and len(lines[0]) >= 187 and is_number(lines[0][7:15]):
         return _finals(lines, path)
     raise ValueError(f"{path.name}: neither finals2000A nor EOP C04; both are files of the IERS")
-
-
-def _number(cell: bytes) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
 
 
 def _raw(lines: list[bytes]) -> Array:
@@ -228,7 +220,7 @@ def _decimals(cells: Array, numbers: Array, path: Path) -> Array:
     try:
         return np.array([float(text) for text in texts])
     except ValueError:
-        number, cell = next((n, text) for n, text in zip(numbers.tolist(), texts, strict=True) if not _number(text))
+        number, cell = next((n, text) for n, text in zip(numbers.tolist(), texts, strict=True) if not is_number(text))
         raise ValueError(f"{path.name}, line {number}: {cell.decode('ascii', 'replace').strip()!r} is not a number") from None
 
 

@@ -194,7 +194,7 @@ def _header(path: Path, lines: list[str]) -> dict[str, str]:
 def _icgem(path: Path, lines: list[str], end: int) -> GravityField:
     head = _header(path, lines[:end])
     gm, radius = (_number(head[k], f"{path.name}: {k}") for k in ("earth_gravity_constant", "radius"))
-    degree = _degree(head["max_degree"], path)
+    degree = _index(head["max_degree"], f"{path.name}: max_degree")
     if gm <= 0.0 or radius <= 0.0:
         raise ValueError(f"{path.name}: GM is {gm:g} and radius {radius:g}; both must be positive")
     norm = head.get("norm", "fully_normalized")
@@ -315,10 +315,6 @@ def _index(text: str, place: str) -> int:
     if not (text.isascii() and text.isdigit() and int(text) <= HIGHEST_DEGREE):
         raise ValueError(f"{place}: {text!r} is no degree or order (0 to {HIGHEST_DEGREE})")
     return int(text)
-
-
-def _degree(text: str, path: Path) -> int:
-    return _index(text, f"{path.name}: max_degree")
 
 
 def _year(text: str, place: str) -> float:

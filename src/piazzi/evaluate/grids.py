@@ -41,14 +41,18 @@ class Grid:
         return Grid(self.title, tuple(self.heads[i] for i in kept), rows, left)
 
 
-def as_rich(grids: Sequence[Grid], sentences: Iterable[str], console: Console, options: ConsoleOptions) -> Iterable[Any]:
-    """Tables and sentences for rich."""
+def as_rich(
+    grids: Sequence[Grid], sentences: Iterable[str], console: Console, options: ConsoleOptions, above: Iterable[str] = ()
+) -> Iterable[Any]:
+    """Tables for rich, with sentences below and `above` them."""
     from rich.text import Text
 
+    for line in above:
+        yield Text(printable(line))
     for grid in grids:
         yield from _fitted(grid, console, options)
     for line in sentences:
-        yield Text(line)
+        yield Text(printable(line))
 
 
 def _fitted(grid: Grid, console: Console, options: ConsoleOptions) -> Iterable[Any]:

@@ -10,7 +10,6 @@ import numpy as np
 
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.bounds import Bounds, residuals_at
-from piazzi.evaluate.consistency import Check
 from piazzi.evaluate.consistency_tests import LONGEST, ConsistencyTests, check_consistency
 from piazzi.evaluate.metrics import (
     convergence_time,
@@ -103,16 +102,13 @@ def _tests(found: ConsistencyTests) -> dict[str, float | None]:
     out: dict[str, float | None] = {}
     two_sided = {"nees": found.nees, "nees_last_half": found.nees_last_half, "nis": found.nis}
     for name, check in two_sided.items():
-        out |= {f"{name}_low": None, f"{name}_high": None} if check is None else _bounds(name, check)
+        low, high = (None, None) if check is None else (finite(check.low), finite(check.high))
+        out |= {f"{name}_low": low, f"{name}_high": high}
     out["nees_effective_epochs"] = None if found.nees is None else finite(found.nees.effective)
     for name, check in {"whiteness": found.whiteness, "bias": found.bias}.items():
         out[name] = None if check is None else finite(check.statistic)
         out[f"{name}_high"] = None if check is None else finite(check.high)
     return out
-
-
-def _bounds(name: str, check: Check) -> dict[str, float | None]:
-    return {f"{name}_low": finite(check.low), f"{name}_high": finite(check.high)}
 
 
 def evaluate(name: str, estimate: Estimate, bounds: Bounds | None = None, *, thorough: bool = True) -> Row:

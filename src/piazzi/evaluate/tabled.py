@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 class Tabled:
     """A result that is tables and sentences, the same in a terminal, a notebook, LaTeX and text."""
 
+    def headlines(self) -> Iterable[str]:
+        """What is said above them."""
+        return ()
+
     def grids(self) -> list[Grid]:
         """The tables."""
         raise NotImplementedError
@@ -37,10 +41,10 @@ class Tabled:
         return as_latex(self.grids())
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterable[Any]:
-        yield from as_rich(self.grids(), self.sentences(), console, options)
+        yield from as_rich(self.grids(), self.sentences(), console, options, self.headlines())
 
     def _repr_html_(self) -> str:
-        return as_html(self.grids(), self.sentences())
+        return as_html(self.grids(), [*self.headlines(), *self.sentences()])
 
     def __str__(self) -> str:
         return as_text(self)

@@ -27,13 +27,7 @@ _UNITS = {"WGS84": 1.0, "ICRF_KM": 1e3, "ICRF_AU": AU}
 
 
 def read_psv(data: bytes, name: str, told: Conventions) -> Observations:
-    """Observations of pipe-separated values, as `observe` has them.
-
-    Raises
-    ------
-    ValueError
-        With the file and the line, for what does not fit the format.
-    """
+    """Observations of pipe-separated values, as `observe` has them; ValueError with file, line and reason."""
     header: list[str] = []
     rows, line = Rows(EXTRA), 0
     try:
@@ -54,13 +48,7 @@ def read_psv(data: bytes, name: str, told: Conventions) -> Observations:
 
 
 def read_xml(data: bytes, name: str, told: Conventions) -> Observations:
-    """Observations of an XML document, as `observe` has them.
-
-    Raises
-    ------
-    ValueError
-        With the file and the line, for what is no XML or does not fit the format.
-    """
+    """Observations of an XML document, as `observe` has them; ValueError with file, line and reason."""
     source, rows, record, begun = Source(name), Rows(EXTRA), dict[str, str](), [0]
 
     def begins(element: str, attributes: dict[str, str], line: int) -> None:

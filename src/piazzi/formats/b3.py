@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from piazzi.formats.conventions import Conventions
-from piazzi.formats.fields import day_of_year, integer
+from piazzi.formats.fields import day_of_year, integer, second_of_day
 from piazzi.formats.observations import Observations
 from piazzi.formats.rows import Row, Rows
 
@@ -38,11 +38,7 @@ def read(data: bytes, name: str, told: Conventions) -> Observations:
     """Ranges, range rates and directions; km and degrees turned to SI.
 
     Ranges whose exponent contradicts their neighbours are told and not to be used; ``repair="exponent"`` mends them.
-
-    Raises
-    ------
-    ValueError
-        With the file and the line, for what does not fit the format.
+    Raises ValueError with file, line and reason.
     """
     lines = data.decode("latin-1").split("\n")
     moving = any(line[74:75] in ("8", "9") for line in lines)
@@ -97,9 +93,7 @@ def _date(line: str) -> tuple[int, float]:
     year = integer(line[9:11], "year")
     day = day_of_year(year + (1900 if year >= 57 else 2000), integer(line[11:14], "day of the year"))
     hour, minute, milli = integer(line[14:16], "hour"), integer(line[16:18], "minute"), integer(line[18:23], "second")
-    if not (0 <= hour < 24 and 0 <= minute < 60 and 0 <= milli < 61000):
-        raise ValueError(f"{hour}:{minute}:{milli / 1e3:g} is no time of a day")
-    return day, 3600.0 * hour + 60.0 * minute + milli / 1e3
+    return day, second_of_day(hour, minute, milli / 1e3)
 
 
 def _range(line: str) -> float | None:

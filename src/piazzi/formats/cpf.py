@@ -39,10 +39,7 @@ class _File:
 def read(data: bytes, name: str, told: Conventions) -> Ephemeris:
     """The arc that is predicted: positions of the centre of mass or of the reflector, as `said` has it.
 
-    Raises
-    ------
-    ValueError
-        With the file and the line, for what does not fit the format.
+    Raises ValueError with file, line and reason.
     """
     file, line = _File(), 0
     try:

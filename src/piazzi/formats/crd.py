@@ -32,10 +32,7 @@ _WITHOUT = ("transmit times only", "receive times only")
 def read(data: bytes, name: str, told: Conventions) -> Observations:
     """The ranges of a file, without passes that a later release in the same file replaces.
 
-    Raises
-    ------
-    ValueError
-        With the file and the line, for what does not fit the format.
+    Raises ValueError with file, line and reason.
     """
     laser = parse(BytesIO(data), name)
     sessions, group = laser.sessions, np.frombuffer(laser.group, dtype=np.int32) if laser.group else np.zeros(0, np.int32)

@@ -36,6 +36,13 @@ def integer(text: str, what: str) -> int:
         raise ValueError(f"{what} is {text[:40]!r}, which is no whole number") from None
 
 
+def second_of_day(hour: int, minute: int, second: float) -> float:
+    """Seconds of a day that may end with a leap second."""
+    if not (0 <= hour < 24 and 0 <= minute < 60 and 0.0 <= second < 61.0):
+        raise ValueError(f"{hour}:{minute}:{second:g} is no time of a day")
+    return 3600.0 * hour + 60.0 * minute + second
+
+
 def calendar_day(year: int, month: int, day: int) -> int:
     """Modified Julian Day of a date."""
     try:

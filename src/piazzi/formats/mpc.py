@@ -37,10 +37,7 @@ class _Reader:
 def read(data: bytes, name: str, told: Conventions) -> Observations:
     """Right ascension and declination of each line, delay and Doppler of radar; replaced ones are counted and left out.
 
-    Raises
-    ------
-    ValueError
-        With the file and the line, for what does not fit the format.
+    Raises ValueError with file, line and reason.
     """
     reader, line = _Reader(Rows(EXTRA)), 0
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from piazzi.formats.observations import Array
+from piazzi.arrays import Array
 
 GAP = 3600.0  # s without a row, behind which another pass begins: a low satellite comes again after 75 min or more
 LONG = 2.0  # times the usual interval: a pause between two blocks of a file that makes them two passes

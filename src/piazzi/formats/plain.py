@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from piazzi.formats.b3 import said_of
 from piazzi.formats.conventions import Conventions
-from piazzi.formats.fields import calendar_day, integer, number
+from piazzi.formats.fields import calendar_day, integer, number, second_of_day
 from piazzi.formats.observations import Observations
 from piazzi.formats.rows import Row, Rows
 
@@ -20,10 +20,7 @@ _KINDS = {
 def read(data: bytes, name: str, told: Conventions) -> Observations:
     """Type, object, sensor, year, month, day, h, m, s of each line, then range (km), azimuth and elevation (deg) or two angles.
 
-    Raises
-    ------
-    ValueError
-        With the file and the line, for what does not fit the format.
+    Raises ValueError with file, line and reason.
     """
     rows, line = Rows(), 0
     try:
@@ -43,11 +40,9 @@ def _plain(rows: Rows, fields: Sequence[str], line: int) -> None:
     if len(fields) != 9 + len(kinds):
         raise ValueError(f"the line has {len(fields)} fields; one of type {fields[0]} has {9 + len(kinds)}")
     day = calendar_day(*(integer(text, "date") for text in fields[3:6]))
-    hour, minute, second = integer(fields[6], "hour"), integer(fields[7], "minute"), number(fields[8], "second")
-    if not (0 <= hour < 24 and 0 <= minute < 60 and 0.0 <= second < 61.0):
-        raise ValueError(f"{hour}:{minute}:{second:g} is no time of a day")
+    seconds = second_of_day(integer(fields[6], "hour"), integer(fields[7], "minute"), number(fields[8], "second"))
     segment = rows.segment(fields[0], scale="UTC", way="two-way", range_is="half")
-    row = Row(day, 3600.0 * hour + 60.0 * minute + second, fields[2], fields[1], segment, line)
+    row = Row(day, seconds, fields[2], fields[1], segment, line)
     for kind, text in zip(kinds, fields[9:], strict=True):
         value = number(text, kind)
         rows.add(row, kind, 1e3 * value if kind == "range" else math.radians(value))

@@ -14,7 +14,7 @@ import numpy as np
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.dates import Readings, instants
 from piazzi.formats.ephemeris import Arc, Ephemeris
-from piazzi.formats.fields import calendar_day, integer, number
+from piazzi.formats.fields import calendar_day, integer, number, second_of_day
 
 # scales that the header names, and seconds to add to their readings to have those of the scale beside it
 _SCALES = {"GPS": ("GPS", 0.0), "GAL": ("GPS", 0.0), "QZS": ("GPS", 0.0), "IRN": ("GPS", 0.0), "BDT": ("GPS", 14.0)}
@@ -58,13 +58,7 @@ class _File:
 
 
 def read(data: bytes, name: str, told: Conventions) -> Ephemeris:
-    """One arc for each satellite that has positions.
-
-    Raises
-    ------
-    ValueError
-        With the file and the line, for what does not fit the format.
-    """
+    """One arc for each satellite that has positions; ValueError with file, line and reason."""
     file, line = _File(), 0
     try:
         for line, text in enumerate(data.decode("latin-1").split("\n"), 1):
@@ -140,9 +134,8 @@ def _date(text: str) -> tuple[float, float]:
         integer(text[a:b].strip(), "date") for a, b in ((3, 7), (8, 10), (11, 13), (14, 16), (17, 19))
     )
     second = number(text[20:31].strip(), "second")
-    if not (0 <= hour <= 23 and 0 <= minute <= 59 and 0.0 <= second < 61.0):
-        raise ValueError(f"{hour}:{minute}:{second:g} is no time of a day")
-    return float(calendar_day(year, month, day)), 3600.0 * hour + 60.0 * minute + second
+    seconds = second_of_day(hour, minute, second)
+    return float(calendar_day(year, month, day)), seconds
 
 
 def _epoch(file: _File, text: str) -> None:

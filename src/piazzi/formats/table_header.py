@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from piazzi.formats.kinds import KINDS
 from piazzi.tables.cells import STATION, TIME, split
 from piazzi.tables.names import IGNORE, SECONDS, WEEK, parts, renamed
-from piazzi.text import nearest
+from piazzi.text import is_number, nearest
 from piazzi.units import Units
 
 PEOPLE = (STATION, "object")
@@ -125,17 +125,9 @@ def content_of(data: bytes, columns: Mapping[str, str]) -> tuple[bytes, list[str
     if not columns:
         return data, None
     cells = next(csv.reader([split(data).first.decode("utf-8", "replace")]), [])
-    if not any(_is_number(cell) for cell in cells):
+    if not any(is_number(cell) for cell in cells):
         return data, None
     return data, [str(i) for i in range(1, len(cells) + 1)]
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
 
 
 def _cut(data: bytes, letters: Mapping[str, re.Match[str]]) -> bytes:
@@ -148,7 +140,7 @@ def _cut(data: bytes, letters: Mapping[str, re.Match[str]]) -> bytes:
     table = csv.writer(out, lineterminator="\n")
     for text in data.decode("utf-8", "replace").split("\n"):
         cells = [text[a:b].strip() for a, b in ends]
-        if text.startswith("#") or not any(_is_number(cell) for cell in cells):
+        if text.startswith("#") or not any(is_number(cell) for cell in cells):
             out.write("\n")
         else:
             table.writerow(cells)

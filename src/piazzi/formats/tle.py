@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import NoReturn
 
 import numpy as np
 
 from piazzi.earth import Epoch
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.ephemeris import Ephemeris, MeanElements
+from piazzi.formats.ndm import Source
 
 LENGTH = 69
 _DEGREE, _DAY = np.pi / 180.0, 86400.0
@@ -22,10 +22,10 @@ _DEGREE, _DAY = np.pi / 180.0, 86400.0
 def read(data: bytes, name: str, told: Conventions) -> Ephemeris:
     """The mean elements of every set in a file; ValueError with file, line and reason."""
     lines = [(k + 1, text.rstrip()) for k, text in enumerate(data.decode("ascii", "replace").splitlines()) if text.strip()]
-    return Ephemeris(arcs=(), mean=tuple(_sets(name, lines)), file=name, format="TLE")
+    return Ephemeris(arcs=(), mean=tuple(_sets(Source(name), lines)), file=name, format="TLE")
 
 
-def _sets(name: str, lines: list[tuple[int, str]]) -> Iterator[MeanElements]:
+def _sets(source: Source, lines: list[tuple[int, str]]) -> Iterator[MeanElements]:
     title, at = "", 0
     while at < len(lines):
         number, text = lines[at]
@@ -33,32 +33,32 @@ def _sets(name: str, lines: list[tuple[int, str]]) -> Iterator[MeanElements]:
             title, at = text.removeprefix("0 ").strip(), at + 1
             continue
         if not text.startswith("1 "):
-            _refuse(name, number, "a line 2 without a line 1 before it")
+            source.refuse(number, "a line 2 without a line 1 before it")
         if at + 1 == len(lines) or not lines[at + 1][1].startswith("2 "):
-            _refuse(name, number, "no line 2 follows this line 1")
+            source.refuse(number, "no line 2 follows this line 1")
         for k, line in lines[at : at + 2]:
-            _check(name, k, line)
-        yield _elements(name, title, lines[at], lines[at + 1])
+            _check(source, k, line)
+        yield _elements(source, title, lines[at], lines[at + 1])
         title, at = "", at + 2
     if title:
-        _refuse(name, lines[-1][0], "a name without elements after it")
+        source.refuse(lines[-1][0], "a name without elements after it")
 
 
-def _check(name: str, number: int, line: str) -> None:
+def _check(source: Source, number: int, line: str) -> None:
     """Refuse a line of another length or with another checksum: digits, and 1 for each minus sign, modulo 10."""
     if len(line) != LENGTH:
-        _refuse(name, number, f"the line has {len(line)} characters; a line of a two-line element set has {LENGTH}")
+        source.refuse(number, f"the line has {len(line)} characters; a line of a two-line element set has {LENGTH}")
     total = sum(int(c) if c.isdigit() else c == "-" for c in line[:-1]) % 10
     if line[-1] != str(total):
-        _refuse(name, number, f"the checksum is {line[-1]!r}, and that of the line is {total}")
+        source.refuse(number, f"the checksum is {line[-1]!r}, and that of the line is {total}")
 
 
-def _elements(name: str, title: str, first: tuple[int, str], second: tuple[int, str]) -> MeanElements:
+def _elements(source: Source, title: str, first: tuple[int, str], second: tuple[int, str]) -> MeanElements:
     (k1, one), (k2, two) = first, second
     if one[2:7] != two[2:7]:
-        _refuse(name, k2, f"line 2 is of object {two[2:7]}, and line 1 of {one[2:7]}")
+        source.refuse(k2, f"line 2 is of object {two[2:7]}, and line 1 of {one[2:7]}")
     values = [
-        _number(name, k2, what, text)
+        _number(source, k2, what, text)
         for what, text in (
             ("mean motion", two[52:63]), ("eccentricity", "." + two[26:33].replace(" ", "0")), ("inclination", two[8:16]),
             ("ascending node", two[17:25]), ("argument of perigee", two[34:42]), ("mean anomaly", two[43:51]),
@@ -67,61 +67,57 @@ def _elements(name: str, title: str, first: tuple[int, str], second: tuple[int, 
     names = ("mean_motion", "eccentricity", "inclination", "ascending_node", "argument_of_pericentre", "mean_anomaly")
     factors = (2.0 * np.pi / _DAY, 1.0, _DEGREE, _DEGREE, _DEGREE, _DEGREE)
     said = {
-        "NORAD_CAT_ID": _catalogue(name, k1, one[2:7]), "CLASSIFICATION_TYPE": one[7].strip() or "U",
+        "NORAD_CAT_ID": _catalogue(source, k1, one[2:7]), "CLASSIFICATION_TYPE": one[7].strip() or "U",
         "EPHEMERIS_TYPE": one[62].strip() or "0", "ELEMENT_SET_NO": one[64:68].strip(), "REV_AT_EPOCH": two[63:68].strip(),
-        "BSTAR": repr(_exponential(name, k1, "drag term", one[53:61])),
-        "MEAN_MOTION_DOT": repr(_number(name, k1, "first derivative of the mean motion", one[33:43])),
-        "MEAN_MOTION_DDOT": repr(_exponential(name, k1, "second derivative of the mean motion", one[44:52])),
+        "BSTAR": repr(_exponential(source, k1, "drag term", one[53:61])),
+        "MEAN_MOTION_DOT": repr(_number(source, k1, "first derivative of the mean motion", one[33:43])),
+        "MEAN_MOTION_DDOT": repr(_exponential(source, k1, "second derivative of the mean motion", one[44:52])),
     }  # fmt: skip
     designator = one[9:17].strip()
     year = int(designator[:2]) if designator[:2].isdigit() else None
     full = "" if year is None else f"{1900 + year if year >= 57 else 2000 + year}-{designator[2:]}"
     return MeanElements(
-        epoch=_epoch(name, k1, one[18:32]), theory="SGP4", name=title or said["NORAD_CAT_ID"], identifier=full,
+        epoch=_epoch(source, k1, one[18:32]), theory="SGP4", name=title or said["NORAD_CAT_ID"], identifier=full,
         centre="EARTH", frame="TEME", scale="UTC", said=tuple((k, v) for k, v in said.items() if v),
         elements=tuple((n, v * f) for n, v, f in zip(names, values, factors, strict=True)),
     )  # fmt: skip
 
 
-def _catalogue(name: str, number: int, text: str) -> str:
+def _catalogue(source: Source, number: int, text: str) -> str:
     """Number of an object in the catalogue; beyond 99999 its first digits are a letter, A for 10, without I and O (alpha-5)."""
     found = re.fullmatch(r"([A-HJ-NP-Z]?)(\d{4})|( *\d{1,5})", text, re.ASCII)
     if not found:
-        _refuse(name, number, f"the object is {text!r}; it must be five digits, or a letter other than I and O and four")
+        source.refuse(number, f"the object is {text!r}; it must be five digits, or a letter other than I and O and four")
     if not found[1]:
         return text.strip()
     return f"{10 + 'ABCDEFGHJKLMNPQRSTUVWXYZ'.index(found[1])}{found[2]}"
 
 
-def _epoch(name: str, number: int, text: str) -> Epoch:
+def _epoch(source: Source, number: int, text: str) -> Epoch:
     import erfa
 
     if not re.fullmatch(r"\d\d[ \d]{3}\.\d+ *", text, re.ASCII):
-        _refuse(name, number, f"the epoch is {text!r}; it must be a year of two digits and a day with its fraction")
+        source.refuse(number, f"the epoch is {text!r}; it must be a year of two digits and a day with its fraction")
     year = int(text[:2])
     whole, _, fraction = text[2:].strip().partition(".")
     start = erfa.cal2jd(1900 + year if year >= 57 else 2000 + year, 1, 1)[1] + 2400000.5
     if not 1 <= int(whole) <= 366:
-        _refuse(name, number, f"the day of the epoch is {int(whole)}; a year has 366 at most")
+        source.refuse(number, f"the day of the epoch is {int(whole)}; a year has 366 at most")
     return Epoch.from_jd(start + int(whole) - 1.0, float("0." + fraction), "UTC")
 
 
-def _number(name: str, number: int, what: str, text: str) -> float:
+def _number(source: Source, number: int, what: str, text: str) -> float:
     if not re.fullmatch(r"\s*[+-]?(\d+\.?\d*|\.\d+)\s*", text, re.ASCII):
-        _refuse(name, number, f"the {what} is {text!r}; it must be a number")
+        source.refuse(number, f"the {what} is {text!r}; it must be a number")
     return float(text)
 
 
-def _exponential(name: str, number: int, what: str, text: str) -> float:
+def _exponential(source: Source, number: int, what: str, text: str) -> float:
     """A number such as `` 12345-4``, which is 0.12345e-4."""
     found = re.fullmatch(r"([ +-])\s*(\d{1,5})([ +-]\d)", text, re.ASCII)
     if not found:
-        _refuse(name, number, f"the {what} is {text!r}; it must be a number as in 12345-4")
+        source.refuse(number, f"the {what} is {text!r}; it must be a number as in 12345-4")
     return float(f"{found[1].strip()}0.{found[2]}e{found[3].replace(' ', '+')}")
-
-
-def _refuse(name: str, number: int, reason: str) -> NoReturn:
-    raise ValueError(f"{name}: line {number}: {reason}")
 
 
 def tle_text(mean: MeanElements) -> str:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.crd_headers import cospar
-from piazzi.formats.fields import calendar_day, integer, number
+from piazzi.formats.fields import calendar_day, integer, number, second_of_day
 from piazzi.formats.observations import Observations
 from piazzi.formats.rows import Row, Rows
 
@@ -140,11 +140,7 @@ def _of_day(text: str) -> float:
     digits = text.strip()
     if not (digits.isdecimal() and digits.isascii() and len(digits) >= 4):
         raise ValueError(f"time is {text[:20]!r}; it has hours and minutes, seconds and decimals")
-    hour, minute = int(digits[:2]), int(digits[2:4])
-    second = float(f"{digits[4:6] or '0'}.{digits[6:] or '0'}")
-    if hour > 23 or minute > 59 or second >= 61.0:
-        raise ValueError(f"{hour}:{minute}:{second:g} is no time of a day")
-    return 3600.0 * hour + 60.0 * minute + second
+    return second_of_day(int(digits[:2]), int(digits[2:4]), float(f"{digits[4:6] or '0'}.{digits[6:] or '0'}"))
 
 
 def _segment(rows: Rows, kinds: tuple[str, str], epoch: str) -> int:
@@ -206,10 +202,7 @@ def _shifted(text: str, whole: int, what: str) -> float:
 def read_rde(data: bytes, name: str, told: Conventions) -> Observations:
     """Positions of RDE reports: a line of the site and month, one of each day, then a line each; 999 ends a report.
 
-    Raises
-    ------
-    ValueError
-        With the file and the line, for what does not fit the format.
+    Raises ValueError with file, line and reason.
     """
     rows, line = Rows(), 0
     report: list[str] = []

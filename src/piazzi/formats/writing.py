@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi.arrays import Array
 from piazzi.earth import Epoch, scales
+from piazzi.earth.epoch import orientation
 
 
 def in_unit(values: Any, factor: float, offset: float = 0.0) -> Array:
@@ -42,13 +43,8 @@ def dates(scale: str, epoch: Epoch, t: Any, digits: int = 9) -> list[str]:
     if not len(t):
         return []
     floor = np.floor(t)
-    orientation = None
-    if scale == "UT1":
-        from piazzi.earth.eop import tables
-
-        orientation = tables()
     whole, fraction = scales.normalized(epoch.whole + floor, epoch.fraction + (t - floor))
-    day, seconds, part = scales.reading(scale, whole, fraction, orientation)
+    day, seconds, part = scales.reading(scale, whole, fraction, orientation(scale))
     ticks = np.round(part * 10.0**digits).astype(np.int64)
     carried = ticks == 10**digits
     ticks, seconds = np.where(carried, 0, ticks), seconds + carried

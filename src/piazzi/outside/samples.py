@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.opening import opened
+from piazzi.text import is_number
 
 
 def read_columns(path: Path) -> np.ndarray[Any, Any]:
@@ -26,9 +27,9 @@ def read_columns(path: Path) -> np.ndarray[Any, Any]:
         try:
             row = [float(cell) for cell in cells]
         except ValueError:
-            if not rows and not any(_is_number(cell) for cell in cells):
+            if not rows and not any(is_number(cell) for cell in cells):
                 continue  # names
-            wrong = next(cell for cell in cells if not _is_number(cell))
+            wrong = next(cell for cell in cells if not is_number(cell))
             raise ValueError(f"{path.name}, line {number}: {wrong!r} is not a number") from None
         if not np.isfinite(row).all():
             raise ValueError(f"{path.name}, line {number}: values must be finite")
@@ -38,11 +39,3 @@ def read_columns(path: Path) -> np.ndarray[Any, Any]:
     if not rows or len(rows[0]) < 2:
         raise ValueError(f"{path.name}: a table has two columns or more, of numbers")
     return np.array(rows)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

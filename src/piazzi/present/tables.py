@@ -16,7 +16,7 @@ from piazzi.model import Model
 from piazzi.problem import Problem, Tracking, epoch_of
 from piazzi.problem.checks import Array
 from piazzi.problem.gaps import in_passes
-from piazzi.text import printable
+from piazzi.text import counted, printable
 
 if TYPE_CHECKING:
     from piazzi.earth import Epoch
@@ -39,8 +39,8 @@ def summary(problem: Problem, tracking: Tracking, source: str) -> str:
     found = len(in_passes(problem, tracking))
     who = f"{stations} in {found:,} passes" if found else stations
     parts = [
-        f"{source}: {_count(len(times), 'epoch')}{span}",
-        f"{_count(len(tracking.row_times) - missing, 'measurement')} by {who}",
+        f"{source}: {counted(len(times), 'epoch')}{span}",
+        f"{counted(len(tracking.row_times) - missing, 'measurement')} by {who}",
         *([f"{missing:,} missing"] if missing else []),
         "truth known" if tracking.truth is not None else "truth not known",
         prior_place(problem, tracking.times),
@@ -58,10 +58,6 @@ def prior_place(problem: Problem, times: Array) -> str:
 def _date(epoch: Epoch | None, t: float, text: str = " ({})") -> str:
     """The date of a time within a text, "" where there is none."""
     return "" if epoch is None else text.format(epoch + t)
-
-
-def _count(many: int, what: str) -> str:
-    return f"{many:,} {what}{'' if many == 1 else 's'}"
 
 
 def state_grid(name: str, estimate: Estimate, k: int = -1) -> Grid:

@@ -10,6 +10,7 @@ from typing import Any
 from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.quantities import NOTHING, display_of, duration, number
 from piazzi.evaluate.tabled import Tabled
+from piazzi.text import counted
 
 MOST_PASSES, MOST_STATIONS = 12, 30
 MOST_STATED = 6
@@ -32,7 +33,7 @@ class Tracked(Tabled):
         found = self.found
         span = f" over {duration(found['seconds'])}, {found['first']} to {found['last']}" if found["rows"] else ""
         files = ", ".join(found["files"][:3]) + (f" and {len(found['files']) - 3} more" if len(found["files"]) > 3 else "")
-        return f"{files}: {_count(found['rows'], 'row')}{span}"
+        return f"{files}: {counted(found['rows'], 'row')}{span}"
 
     def grids(self) -> list[Grid]:
         """Tables of kinds, stations and passes."""
@@ -80,8 +81,8 @@ class Tracked(Tabled):
         odd["not_to_be_used"] = "marked as not to be used"
         for key, words in odd.items():
             if found[key]:
-                yield f"{_count(found[key], 'row')} {words}."
-        yield from (f"Left out: {_count(one['count'], one['reason'], plural='')}." for one in found["left_out"])
+                yield f"{counted(found[key], 'row')} {words}."
+        yield from (f"Left out: {one['count']:,} {one['reason']}." for one in found["left_out"])
         yield from (f"Assumed: {text}." for text in found["assumed"])
         yield from (f"Open: {text}." for text in found["open"])
 
@@ -93,17 +94,13 @@ def _stated(conventions: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for told in conventions:
         counts["; ".join(_told(told, brief))] += told["rows"]
     shown = counts.most_common(MOST_STATED) if brief else counts.items()
-    yield from (f"Stated for {_count(rows, 'row')}: {text}." for text, rows in shown)
+    yield from (f"Stated for {counted(rows, 'row')}: {text}." for text, rows in shown)
     if len(counts) > len(shown):
-        yield f"{_count(len(counts) - len(shown), 'other set')} of conventions with --json."
+        yield f"{counted(len(counts) - len(shown), 'other set')} of conventions with --json."
 
 
 def _shown(value: float | None, factor: float) -> str:
     return number(None if value is None else value * factor, 6)
-
-
-def _count(count: int, what: str, plural: str = "s") -> str:
-    return f"{count:,} {what}{plural if count != 1 else ''}"
 
 
 def _told(told: Mapping[str, Any], brief: bool) -> Iterator[str]:

@@ -49,7 +49,8 @@ def read_physics(file: Table, units: Units, epoch: Epoch | None = None, forces: 
     known, solved = {*out.known, *([STEP] if "step" in file else [])}, file.table("roots")
     out.definitions = read_definitions(file.table("definitions"), {*known, *provided_names(solved.data)}, out)
     out.roots = read_roots(solved, {*known, *out.known, *provided_names(solved.data)}, out, out.functions)
-    out.events = _events(file.table("events"))
+    events = file.table("events")  # names, each with the definition whose zero it is
+    out.events = {name: text for name in events.data if (text := events.text(name)) is not None}
     out.dynamics = _dynamics(file, out)
     sensors = [read_sensor(name, table, units, out, epoch) for name, table in file.table("sensors").tables()]
     out.groups = _groups(file, out)
@@ -132,11 +133,6 @@ def _parameter(name: str, table: Table, units: Units, out: Physics) -> Parameter
         out.units[name] = unit
         return parameter
     return None
-
-
-def _events(table: Table) -> dict[str, str]:
-    """Names of events, each with the definition whose zero it is."""
-    return {name: text for name in table.data if (text := table.text(name)) is not None}
 
 
 def _dynamics(file: Table, out: Physics) -> dict[str, str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from piazzi.present.figures.style import MEASURED, RC, label_of, line_of, plain, plain_ticks
+from piazzi.present.figures.style import MEASURED, RC, label_of, line_of, new_figure, plain, plain_ticks
 from piazzi.present.grid import Measure, Scale, colour, file_name, letters, measures, shares, spreads, where
 from piazzi.problem.checks import Array
 from piazzi.study import Summary
@@ -106,7 +106,7 @@ def mapped(grid: Grid, pair: tuple[str, str]) -> list[Who]:
 def _along_page(summary: Summary, grid: Grid, axis: str, title: str) -> Figure:
     """Rows of measures, a column for values of the other axes."""
     found, columns = measures(summary), shown_of(grid, axis)
-    figure = _figure(max(5.0, 1.2 + 3.0 * len(columns)), 1.9 * len(found) + 0.9)
+    figure = new_figure(max(5.0, 1.2 + 3.0 * len(columns)), 1.9 * len(found) + 0.9)
     axes = figure.subplots(len(found), len(columns), squeeze=False, sharex=True, sharey="row")
     for row, measure in zip(axes, found, strict=True):
         for ax, at in zip(row, columns, strict=True):
@@ -128,7 +128,7 @@ def _map_page(summary: Summary, grid: Grid, pair: tuple[str, str], title: str) -
     others = grid.others(*pair)
     at = others[len(others) // 2]
     cells = [len(grid.axes[axis]) for axis in pair]
-    figure = _figure(1.2 + max(2.4, 0.55 * cells[0] + 0.6) * len(who), (max(1.3, 0.34 * cells[1]) + 0.55) * len(found) + 0.7)
+    figure = new_figure(1.2 + max(2.4, 0.55 * cells[0] + 0.6) * len(who), (max(1.3, 0.34 * cells[1]) + 0.55) * len(found) + 0.7)
     axes = figure.subplots(len(found), len(who), squeeze=False, sharex=True, sharey=True)
     for row, measure in zip(axes, found, strict=True):
         values = np.stack([map_values(grid, pair, measure, one, at) for one in who])
@@ -137,9 +137,3 @@ def _map_page(summary: Summary, grid: Grid, pair: tuple[str, str], title: str) -
             ax.set_title(f"{measure.show.label(plain(measure.name))}, {label_of(*one)}", fontsize=8)
     figure.suptitle(plain(f"{title}{f', {where(at)}' if at else ''}"), fontsize=10, x=0.01, ha="left")
     return figure
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")

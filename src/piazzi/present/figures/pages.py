@@ -23,7 +23,7 @@ from piazzi.present.figures.errors import (
 )
 from piazzi.present.figures.measured import innovations, measurements, passes
 from piazzi.present.figures.space import orbit, path_shape, planes, position_at, position_columns
-from piazzi.present.figures.style import MEASURED, RC, label_of, plain, symmetric_scale
+from piazzi.present.figures.style import MEASURED, RC, label_of, new_figure, plain, symmetric_scale
 from piazzi.problem.gaps import in_passes
 
 if TYPE_CHECKING:
@@ -79,12 +79,6 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
 def _first(comparison: Comparison) -> tuple[str, Estimate]:
     """The estimate that single pictures show: the first that succeeded, else the first."""
     found = list(comparison.estimates.items())
@@ -111,10 +105,10 @@ def orbit_page(comparison: Comparison, planet_radius: float | None = None) -> Fi
     (name, _), estimate = nearest(comparison)
     found_planes = planes(comparison.problem)
     if len(found_planes) == 1:
-        figure = _figure(10.5, 5.4)
+        figure = new_figure(10.5, 5.4)
         axes = figure.subplots(1, 2, gridspec_kw={"width_ratios": [path_shape(estimate, planet_radius), 1.0]})
     else:
-        figure = _figure(10.5, 9.6)
+        figure = new_figure(10.5, 9.6)
         axes = figure.subplots(2, 2).ravel()
     for ax, plane in zip(axes, found_planes, strict=False):
         orbit(ax, estimate, name=name, planet_radius=planet_radius, plane=plane)
@@ -131,7 +125,7 @@ def measurement_page(comparison: Comparison) -> Figure:
     """For each component the measurements above, and the innovations of one estimator below."""
     name, estimate = _first(comparison)
     width = comparison.problem.model.width
-    figure = _figure(10.5, 2.5 * 2 * width + 0.4)
+    figure = new_figure(10.5, 2.5 * 2 * width + 0.4)
     axes = figure.subplots(2 * width, 1, squeeze=False, sharex=True)[:, 0]
     for column in range(width):
         top, bottom = axes[2 * column : 2 * column + 2]
@@ -147,7 +141,7 @@ def measurement_page(comparison: Comparison) -> Figure:
 
 def pass_page(comparison: Comparison) -> Figure:
     """When each station measured."""
-    figure = _figure(10.5, 0.35 * len(comparison.problem.stations) + 1.2)
+    figure = new_figure(10.5, 0.35 * len(comparison.problem.stations) + 1.2)
     passes(figure.add_subplot(), comparison.problem, comparison.tracking).set_title("Passes")
     return figure
 
@@ -156,7 +150,7 @@ def error_page(comparison: Comparison) -> Figure:
     """A column for each estimator (a window's real-time view), a row for each state: errors within +-3 sigma."""
     estimates = list(comparison.estimates.items())
     states = comparison.problem.model.names
-    figure = _figure(max(5.5, 3.6 * len(estimates)), 1.75 * len(states) + 0.6)
+    figure = new_figure(max(5.5, 3.6 * len(estimates)), 1.75 * len(states) + 0.6)
     axes = figure.subplots(len(states), len(estimates), squeeze=False, sharex=True, sharey="row")
     for r, state in enumerate(states):
         show = state_display([e for _, e in estimates], state)
@@ -176,7 +170,7 @@ def overlay_page(comparison: Comparison) -> Figure:
     """Errors of all estimators on the left, what their covariances expect on the right, a row for each group."""
     first = next(iter(comparison.estimates.values()))
     names, known = list(groups(first)), errors(first) is not None
-    figure = _figure(10.5, 2.7 * len(names) + 0.7)
+    figure = new_figure(10.5, 2.7 * len(names) + 0.7)
     axes = figure.subplots(len(names), 1 + known, squeeze=False, sharex=True, sharey="row")
     for row, group in zip(axes, names, strict=True):
         if known:
@@ -194,7 +188,7 @@ def overlay_page(comparison: Comparison) -> Figure:
 def consistency_page(comparison: Comparison) -> Figure:
     """NEES, where the truth is known, above NIS."""
     known = errors(next(iter(comparison.estimates.values()))) is not None
-    figure = _figure(10.5, 2.7 * (1 + known) + 0.7)
+    figure = new_figure(10.5, 2.7 * (1 + known) + 0.7)
     axes = figure.subplots(1 + known, 1, squeeze=False, sharex=True)[:, 0]
     if known:
         nees_track(axes[0], comparison).label_outer()

@@ -11,7 +11,7 @@ import numpy as np
 
 from piazzi.present.figures.grids import grid_pages
 from piazzi.present.figures.pages import save
-from piazzi.present.figures.style import RC, label_of, line_of, plain, plain_ticks, time_axis
+from piazzi.present.figures.style import RC, label_of, line_of, new_figure, plain, plain_ticks, time_axis
 from piazzi.present.grid import file_name
 from piazzi.present.study_table import group_display, ideal_nees, point_name, widest_bounds
 from piazzi.study import Line, Summary
@@ -54,7 +54,7 @@ def point_of(summary: Summary, index: int) -> dict[str, Any]:
 def error_page(summary: Summary, lines: list[Line], title: str = "") -> Figure:
     """For each group of states the root mean square error over runs, and the Cramer-Rao bound; a few lines have bands."""
     stored = summary.stored
-    figure = _figure(8.0, 2.6 * len(stored.groups) + 0.6)
+    figure = new_figure(8.0, 2.6 * len(stored.groups) + 0.6)
     for i, group in enumerate(stored.groups):
         ax = study_errors(figure.add_subplot(len(stored.groups), 1, i + 1), summary, lines, group)
         if i == 0:
@@ -87,7 +87,7 @@ def study_errors(ax: Axes, summary: Summary, lines: list[Line], group: str) -> A
 def nees_page(summary: Summary, lines: list[Line], title: str = "") -> Figure:
     """Mean NEES over runs with the bounds that it should keep."""
     stored = summary.stored
-    figure = _figure(8.0, 3.6)
+    figure = new_figure(8.0, 3.6)
     ax, names = figure.add_subplot(), tuple(line.estimator for line in lines)
     unit = time_axis(ax, stored.times, stored.epoch)
     for line in lines:
@@ -108,7 +108,7 @@ def cost_page(summary: Summary, lines: list[Line], title: str = "") -> Figure:
     """What a run costs, and how far its errors in the last half are from the least possible."""
     stored = summary.stored
     group = stored.groups[0]
-    figure = _figure(7.0, 4.0)
+    figure = new_figure(7.0, 4.0)
     ax, names, seen = figure.add_subplot(), tuple(line.estimator for line in lines), []
     for line in lines:
         value = line.over_bound[group] or (line.rmse_last_half[group] if line.over_bound[group] is None else None)
@@ -143,9 +143,3 @@ def _title(figure: Figure, summary: Summary, lines: list[Line], title: str, rema
 def _heading(summary: Summary, title: str = "") -> str:
     about = summary.stored.about["specification"]
     return f"{title or about['name'] or 'study'}: {about['runs']:,} runs"
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")

@@ -15,6 +15,7 @@ from piazzi.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from piazzi.earth import Epoch
 
@@ -34,6 +35,13 @@ RC: Any = {
     "lines.linewidth": 1.3,
     "svg.hashsalt": "piazzi",  # the same picture has the same bytes
 }
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of that size in inches."""
+    from matplotlib import figure
+
+    return figure.Figure(figsize=(width, height), layout="constrained")
 
 
 def line_of(name: str, view: str, names: tuple[str, ...] = ()) -> dict[str, Any]:
