@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
@@ -14,10 +14,13 @@ import numpy as np
 from piazzi.arrays import Array
 from piazzi.model.functions import Signature
 from piazzi.opening import opened
-from piazzi.outside.differences import disagreement
 from piazzi.outside.evaluation import aligned, check_count, checksum, derivatives, numbers, plain_functions, value
 from piazzi.outside.fragment import Fragment, read_fragment
 from piazzi.text import brief
+
+AGREED = 1e-5  # of a derivative
+ROUNDING = 64 * 2.0**-52  # of a value: what rounding in a function may come to
+LONG = 1e-3  # of an argument: shorter steps have too much rounding in them to tell what is zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,3 +176,39 @@ class Function:
         for k in range(self.arguments):
             for i, measured in disagreement(lambda *x: np.array(self.value(*x)), arguments, k, known[:, k]):
                 yield i, k, float(known[i, k]), measured
+
+
+def disagreement(
+    function: Callable[..., Array], at: Sequence[float], argument: int, derivatives: Array
+) -> list[tuple[int, float]]:
+    """Outputs whose derivative by an argument agrees with central differences of no length, and what the nearest one gives.
+
+    Lengths go from a tenth of the argument down to a millionth, or about zero over six powers of ten to either side of 1; each
+    is extrapolated with its half.  Outputs that have no finite value, or no finite differences, agree.
+    """
+    x = at[argument]
+    steps = np.abs(x) * 10.0 ** -np.arange(1.0, 6.5, 0.5) if x else 10.0 ** np.arange(6.0, -6.5, -0.5)
+    value = function(*at)
+    best = np.full(len(value), np.nan)
+    least = np.full(len(value), np.inf)
+    agreed = ~np.isfinite(value) | ~np.isfinite(derivatives)
+    for h in steps:
+        d = _difference(function, at, argument, float(h))
+        miss = np.abs(d - derivatives)
+        allowed = AGREED * np.maximum(np.abs(d), np.abs(derivatives))
+        if h >= LONG * (abs(x) or 1.0):
+            allowed += ROUNDING * np.abs(value) / h
+        agreed |= miss <= allowed
+        nearer = miss < least
+        best[nearer], least[nearer] = d[nearer], miss[nearer]
+    return [(int(i), float(best[i])) for i in np.flatnonzero(~agreed & np.isfinite(best))]
+
+
+def _difference(function: Callable[..., Array], at: Sequence[float], argument: int, h: float) -> Array:
+    """The central difference, extrapolated with that of half its length."""
+
+    def slope(h: float) -> Array:
+        ends = [[x + s * h if k == argument else x for k, x in enumerate(at)] for s in (1, -1)]
+        return np.asarray((function(*ends[0]) - function(*ends[1])) / (ends[0][argument] - ends[1][argument]))
+
+    return (4.0 * slope(0.5 * h) - slope(h)) / 3.0

@@ -25,12 +25,11 @@ def grid_keys(grid: Grid) -> list[Key]:
     return [Key(label_of(name, view), own[name], dash_of(name, view, names)) for name, view in grid.estimators]
 
 
-def sections_along(summary: Summary, grid: Grid, keys: Sequence[Key], at: At | None = None) -> list[Section]:
-    """A section for every axis; where others are varied too, at these values of theirs, else at some."""
+def sections_along(summary: Summary, grid: Grid, keys: Sequence[Key]) -> list[Section]:
+    """A section for every axis; where others are varied too, at some values of theirs."""
     out = []
     for axis in grid.axes:
-        places = shown_of(grid, axis) if at is None else [{name: v for name, v in at.items() if name != axis}]
-        for others in places:
+        for others in shown_of(grid, axis):
             title = f"Against {printable(axis)}{f', where {where(others)}' if others else ''}"
             charts = [_against(grid, axis, measure, others, keys) for measure in measures(summary)]
             out.append(Section(title, charts, _SPREAD))
