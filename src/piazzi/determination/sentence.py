@@ -20,8 +20,3 @@ class Sentence:
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
         return {"ok": self.ok, "figure": finite(self.figure), "test": self.test, "sentence": self.sentence}
-
-
-def count_of(many: int, what: str) -> str:
-    """How many there are of something, in words."""
-    return f"{many} {what}{'' if many == 1 else 's'}"
