@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
+from math import isfinite
 from typing import Any
 
 LONGEST = 500
@@ -56,6 +57,17 @@ def is_number(text: str | bytes) -> bool:
     except ValueError:
         return False
     return True
+
+
+def finite_number(text: str, place: str) -> float:
+    """A number of a file, with E or, as Fortran writes it, D; ValueError with its place for any other text."""
+    try:
+        value = float(text.replace("D", "E").replace("d", "e"))
+    except ValueError:
+        raise ValueError(f"{place}: {text!r} is not a number") from None
+    if not isfinite(value):
+        raise ValueError(f"{place}: {text!r} is not finite")
+    return value
 
 
 def suggestion(name: str, valid: Iterable[object]) -> str:

@@ -20,7 +20,7 @@ from piazzi.arrays import Array
 from piazzi.earth.conventional import SOURCE, conventional
 from piazzi.earth.epoch import Epoch
 from piazzi.opening import opened
-from piazzi.text import brief
+from piazzi.text import brief, finite_number
 
 PACKAGED = ("EGM2008", "IERS2010")
 HIGHEST_DEGREE = 2190
@@ -193,7 +193,7 @@ def _header(path: Path, lines: list[str]) -> dict[str, str]:
 
 def _icgem(path: Path, lines: list[str], end: int) -> GravityField:
     head = _header(path, lines[:end])
-    gm, radius = (_number(head[k], f"{path.name}: {k}") for k in ("earth_gravity_constant", "radius"))
+    gm, radius = (finite_number(head[k], f"{path.name}: {k}") for k in ("earth_gravity_constant", "radius"))
     degree = _index(head["max_degree"], f"{path.name}: max_degree")
     if gm <= 0.0 or radius <= 0.0:
         raise ValueError(f"{path.name}: GM is {gm:g} and radius {radius:g}; both must be positive")
@@ -226,7 +226,9 @@ def _record(place: str, kind: str, words: list[str], sigmas: int) -> _Record:
     if len(words) < 4:
         raise ValueError(f"{place}: a row has degree, order, C and S; this one has {len(words)} values")
     n, m = _index(words[0], place), _index(words[1], place)
-    return _Record(place, kind, n, m, _number(words[2], place), _number(words[3], place), tuple(words[4 + sigmas :]))
+    return _Record(
+        place, kind, n, m, finite_number(words[2], place), finite_number(words[3], place), tuple(words[4 + sigmas :])
+    )
 
 
 def _records(path: Path, lines: list[str], start: int, sigmas: int) -> Iterator[_Record]:
@@ -271,7 +273,7 @@ def _term(r: _Record, pieces: bool, reference: dict[tuple[int, int], float]) -> 
         raise ValueError(
             f"{r.place}: a row {r.kind} ends with {'two dates' if pieces else 'its period'}; there are {len(r.rest)} values"
         )
-    period = _number(r.rest[-1], r.place) if r.kind in ("acos", "asin") else 1.0
+    period = finite_number(r.rest[-1], r.place) if r.kind in ("acos", "asin") else 1.0
     if not period > 0.0:
         raise ValueError(f"{r.place}: a wave has a period of {period:g} years")
     if pieces:
@@ -299,16 +301,6 @@ def normalisation(degree: int) -> Array:
             log = math.lgamma(n - m + 1) - math.lgamma(n + m + 1) + math.log((2 * n + 1) * (1 if m == 0 else 2))
             factors[n, m] = math.exp(0.5 * log)
     return factors
-
-
-def _number(text: str, place: str) -> float:
-    try:
-        value = float(text.replace("D", "E").replace("d", "e"))
-    except ValueError:
-        raise ValueError(f"{place}: {text!r} is not a number") from None
-    if not math.isfinite(value):
-        raise ValueError(f"{place}: {text!r} is not finite")
-    return value
 
 
 def _index(text: str, place: str) -> int:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.stations import Coordinates, Eccentricity, Station
 from piazzi.opening import opened
+from piazzi.text import finite_number
 
 _BLOCKS = ("SITE/ID", "SITE/ECCENTRICITY", "SOLUTION/EPOCHS", "SOLUTION/ESTIMATE")
 _AXES = ("STAX", "STAY", "STAZ", "VELX", "VELY", "VELZ")
@@ -75,16 +76,6 @@ def _date(path: Path, number: int, text: str) -> Epoch | None:
         raise ValueError(f"{path.name}, line {number}: {text.strip()!r} is no date; SINEX writes YY:DDD:SSSSS") from None
 
 
-def _number(path: Path, number: int, text: str) -> float:
-    try:
-        value = float(text.replace("D", "E").replace("d", "e"))
-    except ValueError:
-        raise ValueError(f"{path.name}, line {number}: {text.strip()!r} is not a number") from None
-    if value - value != 0.0:
-        raise ValueError(f"{path.name}, line {number}: {text.strip()!r} is not finite")
-    return value
-
-
 def _span(path: Path, row: Row) -> tuple[tuple[str, str, str], tuple[Epoch | None, Epoch | None]]:
     number, text = row
     key = text[1:5].strip(), text[6:8].strip(), text[9:13].strip()
@@ -105,7 +96,7 @@ def _estimates(
         wanted = ("m",) if kind.startswith("STA") else ("m/y", "m/yr", "m/a")
         if unit not in wanted:
             raise ValueError(f"{path.name}, line {number}: {kind} is in {unit!r}; it is read in {wanted[0]}")
-        found.setdefault(key, {})[kind] = _number(path, number, text[47:68])
+        found.setdefault(key, {})[kind] = finite_number(text[47:68].strip(), f"{path.name}, line {number}")
         references[key] = _date(path, number, text[27:39])
     result: dict[str, list[Coordinates]] = {}
     for key, values in found.items():
@@ -125,7 +116,8 @@ def _eccentricity(path: Path, row: Row) -> tuple[str, Eccentricity]:
     number, text = row
     if text[42:45] != "UNE":
         raise ValueError(f"{path.name}, line {number}: eccentricities in {text[42:45]!r}; they are read up, north, east (UNE)")
-    up, north, east = (_number(path, number, text[a:b]) for a, b in ((46, 54), (54, 63), (63, 72)))
+    place = f"{path.name}, line {number}"
+    up, north, east = (finite_number(text[a:b].strip(), place) for a, b in ((46, 54), (54, 63), (63, 72)))
     since, until = _date(path, number, text[16:28]), _date(path, number, text[29:41])
     return text[1:5].strip(), Eccentricity(up, north, east, since, until, text[6:8].strip())
 
