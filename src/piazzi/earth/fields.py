@@ -225,10 +225,9 @@ class _Record(NamedTuple):
 def _record(place: str, kind: str, words: list[str], sigmas: int) -> _Record:
     if len(words) < 4:
         raise ValueError(f"{place}: a row has degree, order, C and S; this one has {len(words)} values")
-    n, m = _index(words[0], place), _index(words[1], place)
-    return _Record(
-        place, kind, n, m, finite_number(words[2], place), finite_number(words[3], place), tuple(words[4 + sigmas :])
-    )
+    n, m = (_index(word, place) for word in words[:2])
+    c, s = (finite_number(word, place) for word in words[2:4])
+    return _Record(place, kind, n, m, c, s, tuple(words[4 + sigmas :]))
 
 
 def _records(path: Path, lines: list[str], start: int, sigmas: int) -> Iterator[_Record]:

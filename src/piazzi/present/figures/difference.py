@@ -9,7 +9,7 @@ import numpy as np
 from piazzi.evaluate.quantities import display_of
 from piazzi.orbit.difference import Difference
 from piazzi.present.colours import STATIONS
-from piazzi.present.figures.style import RC, plain, time_axis
+from piazzi.present.figures.style import RC, new_figure, plain, time_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,11 +33,10 @@ def difference_track(ax: Axes, found: Difference, axis: int) -> Axes:
 def difference_page(found: Difference, title: str = "") -> Figure:
     """A picture with the three axes below one another."""
     from matplotlib import rc_context
-    from matplotlib.figure import Figure
 
     style: Any = RC
     with rc_context(style):
-        figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+        figure = new_figure(9.0, 6.0)
         tracks = figure.subplots(3, 1, sharex=True)
         for axis in range(3):
             difference_track(tracks[axis], found, axis).label_outer()

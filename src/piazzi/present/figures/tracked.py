@@ -8,7 +8,7 @@ import numpy as np
 
 from piazzi.formats import Observations
 from piazzi.present.colours import STATIONS
-from piazzi.present.figures.style import RC, plain, time_axis
+from piazzi.present.figures.style import RC, new_figure, plain, time_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,12 +43,11 @@ def schedule(ax: Axes, observations: Observations) -> Axes:
 def schedule_page(observations: Observations, title: str) -> Figure:
     """The picture of when what was measured."""
     from matplotlib import rc_context
-    from matplotlib.figure import Figure
 
     style: Any = RC
     with rc_context(style):
         pairs = len(np.unique(np.stack([observations.station, observations.kind], axis=1), axis=0))
-        figure = Figure(figsize=(10.5, 1.4 + 0.28 * min(pairs, MOST_LINES)), layout="constrained")
+        figure = new_figure(10.5, 1.4 + 0.28 * min(pairs, MOST_LINES))
         schedule(figure.subplots(), observations)
         figure.suptitle(plain(title), fontsize=11, x=0.01, ha="left")
     return figure
