@@ -156,16 +156,22 @@ def test_complete_is_what_a_fit_with_the_larger_field_changes(given):
     assert said.ok or f"--forces '{words_for(small.setup, [n for n, moved in found.items() if moved > 1.0])}'" in said.sentence
 
 
-@pytest.mark.parametrize(("switch", "name"), [("moon_on", "the pull of Moon"), ("relativity_on", "relativity")])
-def test_complete_is_what_a_fit_with_the_force_changes(given, switch, name):
-    """Against two fits of the same rows, with the force and without it; so quiet that neither leaves out a row."""
+def fitted(given, **switches):
+    """The fit of rows so quiet that none is left out."""
+    problem = replace(given.problem, parameters={**given.problem.parameters, **switches})
     z = given.tracking.values + 0.3 * noise(given, 7)
+    return solved(approached(replace(with_values(given, z), problem=problem)), estimators(("batch",)))
 
-    def fitted(on):
-        problem = replace(given.problem, parameters={**given.problem.parameters, switch: on})
-        return solved(approached(replace(with_values(given, z), problem=problem)), estimators(("batch",)))
 
-    without, whole = fitted(0.0), fitted(1.0)
+@pytest.fixture(scope="module")
+def whole(given):
+    return fitted(given, moon_on=1.0, relativity_on=1.0)
+
+
+@pytest.mark.parametrize(("switch", "name"), [("moon_on", "the pull of Moon"), ("relativity_on", "relativity")])
+def test_complete_is_what_a_fit_with_the_force_changes(given, whole, switch, name):
+    """Against two fits of the same rows, with the force and without it."""
+    without = fitted(given, **{"moon_on": 1.0, "relativity_on": 1.0, switch: 0.0})
     assert without.keep.all() and whole.keep.all()
     moved = np.abs(whole.estimate.mean[0, :6] - without.estimate.mean[0, :6])
     expected = float(np.max(moved / np.sqrt(np.diag(without.estimate.covariance[0])[:6])))

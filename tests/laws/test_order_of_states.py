@@ -67,7 +67,9 @@ def advection():
     [pytest.param(o, id=i, marks=() if i == "mixed" else pytest.mark.slow) for o, i in zip(ORDERS, NAMES, strict=True)],
 )
 @pytest.mark.parametrize(
-    "estimator", [pz.Smoother(), pz.FactorGraph(), pz.SlidingWindow(lag=10)], ids=lambda e: type(e).__name__
+    "estimator",
+    [pz.Smoother(), pz.FactorGraph(), pytest.param(pz.SlidingWindow(lag=10), marks=pytest.mark.slow)],  # the dearest kernel
+    ids=lambda e: type(e).__name__,
 )
 @pytest.mark.parametrize("lanes", ["", "1"])
 def test_advection_in_any_order(advection, order, estimator, lanes, monkeypatch):
