@@ -121,10 +121,10 @@ def test_a_saved_case_gives_the_same_bits(folder):
         ("[determine", "is not TOML"),
     ],
 )
-def test_what_is_wrong_with_a_case_is_said_in_one_line(tmp_path, text, says):
+def test_what_is_wrong_with_a_case_is_said_in_one_line(tmp_path, call, monkeypatch, text, says):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "case.toml").write_text(text)
-    done = program(tmp_path, "case.toml", "one.oem")
-    assert done.returncode == 2 and says in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+    assert says in call("determine", "case.toml", "one.oem").refused()
 
 
 @pytest.mark.parametrize(
@@ -138,11 +138,11 @@ def test_what_is_wrong_with_a_case_is_said_in_one_line(tmp_path, text, says):
         (["one.oem", "-o", "a.oem", "--save", "one.oem"], "same file"),
     ],
 )
-def test_what_cannot_be_written_or_read_is_refused_before_the_work(folder, arguments, says):
+def test_what_cannot_be_written_or_read_is_refused_before_the_work(folder, call, monkeypatch, arguments, says):
+    monkeypatch.chdir(folder)
     (folder / "case2.toml").write_text(CASE)
     before = (folder / "one.oem").read_bytes()
-    done = program(folder, *arguments)
-    assert done.returncode == 2 and says in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+    assert says in call("determine", *arguments).refused()
     assert (folder / "one.oem").read_bytes() == before
 
 

@@ -127,10 +127,6 @@ def test_an_orbit_of_before_takes_the_first_row_at_once(tmp_path, table):
     assert max(told[0]["sigma"].values()) < 30.0
 
 
-def refused(folder, *arguments, text=""):
-    return subprocess.run([*PIAZZI, *arguments], cwd=folder, capture_output=True, text=True, input=text, timeout=HANGS)
-
-
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -146,10 +142,10 @@ def refused(folder, *arguments, text=""):
         (["-"], "standard input is followed: add --follow"),
     ],
 )
-def test_what_cannot_be_followed_is_refused_in_one_line(tmp_path, arguments, says):
-    done = refused(tmp_path, *arguments)
-    assert done.returncode == 2 and says in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
-    assert not os.listdir(tmp_path) and done.stdout == ""
+def test_what_cannot_be_followed_is_refused_in_one_line(tmp_path, call, monkeypatch, arguments, says):
+    monkeypatch.chdir(tmp_path)
+    assert says in call("determine", *arguments).refused()
+    assert not os.listdir(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -162,7 +158,8 @@ def test_what_cannot_be_followed_is_refused_in_one_line(tmp_path, arguments, say
     ],
 )
 def test_what_a_stream_leaves_open_is_asked_for(tmp_path, text, status, says):
-    done = refused(tmp_path, "-", "--follow", text=text)
+    command = [*PIAZZI, "-", "--follow"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, input=text, timeout=HANGS)
     assert done.returncode == status and says in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
     assert done.stdout == "" and not Path(tmp_path, "last.oem").exists()
 

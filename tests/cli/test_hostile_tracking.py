@@ -1,12 +1,7 @@
 """Broken and odd files of tracking, and bad ways to call, through the whole program: one clear line, nothing half written."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
-
-from tests.waiting import HANGS
 
 STATIONS = '[[stations]]\nname = "7090"\nlatitude = -29.0\nlongitude = 115.3\nheight = "240 m"\n'
 CRD = """H1 CRD  1 2016 02 14 01
@@ -82,17 +77,14 @@ def folder(tmp_path_factory):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("arguments", [*([name] for name in [*FILES, "noise.tdm"]), *CALLS.values()], ids=" ".join)
-def test_it_ends_with_one_line_and_leaves_nothing(folder, arguments):
+def test_it_ends_with_one_line_and_leaves_nothing(folder, call, monkeypatch, arguments):
+    monkeypatch.chdir(folder)
     sites = [] if "--stations" in arguments else ["--stations", "sites.toml"]
     output = [] if "-o" in arguments else ["-o", "out.oem"]
     (folder / "out.oem").unlink(missing_ok=True)
-    done = subprocess.run(
-        [sys.executable, "-m", "piazzi", "determine", *arguments, *sites, *output],
-        cwd=folder, capture_output=True, text=True, timeout=HANGS,
-    )  # fmt: skip
-    said = [line for line in done.stderr.splitlines() if "compiling" not in line]
-    assert done.returncode in (2, 3), done.stderr
-    assert "Traceback" not in done.stderr and "Traceback" not in done.stdout
-    if done.returncode == 2:
-        assert len(said) == 1, said
+    done = call("determine", *arguments, *sites, *output)
+    assert done.status in (2, 3), done.err
+    assert "Traceback" not in done.err and "Traceback" not in done.out
+    if done.status == 2:
+        assert len(done.said) == 1, done.said
     assert not (folder / "out.oem").exists() and not list(folder.glob("*.tmp*"))
