@@ -10,6 +10,8 @@ from piazzi import earth
 from piazzi.determination import Guess
 from piazzi.determination.determining import prepared, ready, solved
 from piazzi.determination.fit import estimators
+from piazzi.determination.partners import partners_of, with_partners
+from piazzi.determination.sensing import measured
 from piazzi.determination.setup import follow
 from piazzi.estimate.chi_square import quantile
 from piazzi.evaluate.information import predicted
@@ -88,6 +90,14 @@ RUNS = 20
 def given(name):
     sites = [station("NORTH"), station("WEST")]
     return prepared(KINDS[name](), stations=sites, participant=PARTICIPANTS, corrections="applied", **WORDS)
+
+
+def test_it_is_said_that_orbits_of_others_are_not_estimated():
+    for kind, names in (("range of another", "TWIN"), ("pseudorange", ", ".join(NAVIGATION))):
+        partners = partners_of(PARTICIPANTS)
+        seen = measured(with_partners(KINDS[kind](), partners), partners=partners)
+        said = [text for text in seen.assumed if "not estimated" in text]
+        assert said == [f"orbits taken as they are given, without errors, and not estimated: {names}"]
 
 
 def squares(name, runs):

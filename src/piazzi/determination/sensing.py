@@ -28,6 +28,7 @@ from piazzi.formats import KINDS, Observations
 from piazzi.model import Sensor
 from piazzi.problem import Station, Tracking
 from piazzi.problem.checks import Array
+from piazzi.text import listed
 
 MOST_SIGMAS = 200  # different noise matrices of one station and sensor; beyond, sigmas are rounded up to two digits
 # kinds of rows, and what makes parts of all rows of these kinds; who takes a kind takes it from all stations
@@ -159,6 +160,8 @@ def measured(
     if not parts:
         raise ValueError(f"{_where(everything)}there is no measurement to use: {', '.join(context.left)}")
     sensors, places, names, labels = _stations(parts)
+    if others := [one for one in context.partners if one in labels.values()]:
+        context.said[f"orbits taken as they are given, without errors, and not estimated: {listed(others)}"] = None
     times = np.concatenate([part.t for part in parts]) + (everything.epoch - epoch)
     width = max(part.values.shape[1] for part in parts)
     values = np.concatenate([_padded(part.values, width, np.nan) for part in parts])
