@@ -83,6 +83,12 @@ def load(
     return problem, tracking
 
 
+def words_of(said: Recording) -> dict[str, Any]:
+    """The same as words for `load`."""
+    own = {f.name: getattr(said, f.name) for f in fields(said) if f.name != "answers"}
+    return {**said.answers, **{WORDS.get(name, name): value for name, value in own.items()}}
+
+
 def is_tracking(source: str, scenario: str | os.PathLike[str] | None) -> bool:
     """Whether a source is a file of tracking that a scenario makes a problem of: no recording, and no scenario itself."""
     if not scenario or source in ("-", *names()):
@@ -115,8 +121,10 @@ def _mapping(columns: Mapping[str, str] | str | None) -> Mapping[str, str]:
 
 def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, said: Recording) -> tuple[Problem, Tracking]:
     kind = Path(text).suffix.lower()
-    if said != Recording() and kind != ".csv":
-        given = next(f.name for f in fields(said) if getattr(said, f.name) != getattr(Recording(), f.name))
+    taken = ("columns", "scale") if kind == ".csv" else ()
+    usual = Recording()
+    others = (f.name for f in fields(said) if f.name not in taken and getattr(said, f.name) != getattr(usual, f.name))
+    if given := next(others, None):
         word = next(iter(said.answers)) if given == "answers" else WORDS.get(given, given)
         raise ValueError(f"{text}: --{word} is for files of tracking, with --scenario")
     if scenario is not None and kind != ".csv":
@@ -135,8 +143,8 @@ def _loaded(text: str, seed: int, scenario: str | os.PathLike[str] | None, said:
         if scenario is None:
             raise ValueError(f"{text}: name the scenario that this .csv file measures: {', '.join(names())}, or a path")
         found = load_scenario(scenario)
-        problem, usual = found.problem, found.recording
-        tracking = read_csv(text, problem, said.scale, said.columns, usual)
+        problem = found.problem
+        tracking = read_csv(text, problem, said.scale, said.columns, found.recording)
         if problem.epoch is None and tracking.epoch is not None:
             problem = replace(problem, epoch=tracking.epoch)
         return _with_prior_before(text, problem, tracking)

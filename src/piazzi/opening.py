@@ -5,11 +5,20 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from pathlib import Path
 from typing import BinaryIO
+
+_PACKAGE = os.path.join(os.path.dirname(__file__), "")
 
 
 class RecordingWarning(UserWarning):
     """What was put right in a recording, or taken to mean something."""
+
+
+def told_path(path: str | os.PathLike[str]) -> str:
+    """A file as messages and results name it: one of the package by the name that it goes by there."""
+    text = os.fspath(path)
+    return Path(text).stem if text.startswith(_PACKAGE) else text
 
 
 def opened(path: str | os.PathLike[str]) -> BinaryIO:

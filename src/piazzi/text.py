@@ -98,7 +98,7 @@ def listed(names: Iterable[str], most: int = 6) -> str:
 def nearest(name: str, valid: Iterable[object]) -> str:
     """'; did you mean ...?' with the nearest valid name, or the list of them."""
     options = [str(v) for v in valid]
-    return suggest(name, options) or (f"; known: {', '.join(options)}" if options else "")
+    return suggest(name, options) or (f"; known: {listed(options, 24)}" if options else "")
 
 
 def brief(thing: Any) -> str:

@@ -121,3 +121,11 @@ def test_no_command_shows_the_help(call):
 )
 def test_what_was_mistyped_is_named_in_one_line(call, arguments, message):
     assert message.lower() in call(*arguments).refused().lower()
+
+
+def test_fish_is_given_whole_lines_of_help():
+    """One comma parts the kind of an answer from it; those behind are of the help."""
+    from piazzi.cli.completing import _Fish
+
+    assert _Fish.source_template.count('string split -m 1 ","') == 1
+    assert _Fish.source_template.count("string split") == 1

@@ -83,7 +83,7 @@ def test_covariances_of_other_axes_are_turned(call, tmp_path, axes):
 def test_the_forces_of_the_height_are_said(call, opm):
     text = call("propagate", opm, "--to", "0").out
     assert "drag (harris-priester) (default at " in text
-    assert "Assumed: cr_a_m = 0.013 m2/kg, cd_a_m = 0.022 m2/kg" in text
+    assert "Assumed: cr_a_m = 0.013 m2/kg.\nAssumed: cd_a_m = 0.022 m2/kg" in text
 
 
 def test_sunlight_on_laser_spheres_is_known_and_else_its_doubt_is_said(call, opm, tmp_path):

@@ -6,10 +6,10 @@ import pytest
 
 
 def test_compare_writes_a_report_beside_its_json(call, tmp_path):
-    found = call("compare", "b612-range", "--with", "ekf", "--json", "--report", tmp_path / "new" / "folder")
+    found = call("compare", "b612-range", "--with", "ekf", "--json", "--report", tmp_path / "folder")
     assert found.status == 0
     assert found.document["schema"] == "piazzi.compare/1"
-    text = (tmp_path / "new" / "folder" / "report.html").read_text()
+    text = (tmp_path / "folder" / "report.html").read_text()
     assert "Probe around B612" in text and "ekf" in text
 
 

@@ -53,14 +53,14 @@ def test_sources_and_seeds(call, place, command, arguments, words):
         (["windows", B612, "--iterations", "x"], "'--iterations': 'x' is not a valid whole number"),
         (["simulate", B612, "--tolerance", "x"], "'--tolerance': 'x' is not a valid number"),
         (["study", B612, "--runs", "x"], "'--runs': 'x' is not a valid whole number"),
-        (["study", B612, "--vary", "x"], "study: --vary 'x': write NAME=VALUE,VALUE,... (see"),
+        (["study", B612, "--vary", "x"], "study: --vary 'x': write NAME=VALUE,VALUE,..., such as lag=10,100 (see"),
         (["study", "a.npz"], "study: a.npz: a study simulates; name a scenario, not a recording"),
         (["study", "good.csv"], "study: good.csv: a study simulates; name a scenario, not a recording"),
         (["study", B612, "--figures", "file"], "file: no folder can be made there: a file is in the way"),
         (["study", B612, "--figures", "file/in/it"], "file/in/it: no folder can be made there: a file is in the way"),
         (["study", B612, "--report", "file"], "file: no folder can be made there: a file is in the way"),
         (["compare", B612, "--report", "file"], "file: no folder can be made there: a file is in the way"),
-        (["demo", "-o", "file"], "file/satellite-bearing: no folder can be made there: a file is in the way"),
+        (["demo", "-o", "file"], "file: no folder can be made there: a file is in the way"),
         (["compare", B612, "--with", "window:"], "nothing follows the colon; write window:LAG[xITERATIONS][:LOSS[=K]]"),
         (["estimate", B612, "--with", "ekf:"], "nothing follows the colon; write ekf"),
         (["estimate", B612, "--follow", "noise.csv"], "noise.csv: line 1: it is not UTF-8 text: byte 0xff"),
@@ -73,3 +73,42 @@ def test_values_that_make_no_sense(call, place, arguments, words):
     before = sorted(os.listdir(place))
     assert words in call(*arguments).refused()
     assert sorted(os.listdir(place)) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["determine", "lageos-2", "--participant", "="], "--participant '=': write NAME=FILE"),
+        (["determine", "lageos-2", "--sigma", "range=10deg"], "10deg is no sigma of range: write it as range=1m"),
+        (["determine", "lageos-2", "--columns", "a=b"], "--columns says what columns of tables are: lageos-2 is none"),
+        (["determine", "lageos-2", "--format", "png"], "--format is of what --figures DIR writes"),
+        (["determine", "lageos-2", "--repair", "all"], "--repair 'all' is not known; exponent is"),
+        (["determine", "lageos-2", "--object", "X"], "piazzi: lageos-2: no object 'X'"),
+        (["determine", "lageos-2", "--forces", ""], "forces '': write default"),
+        (["determine", "lageos-2", "--stations", "ilr"], "did you mean 'ilrs'?"),
+        (["determine", "lageos-2", "lageos-2"], "lageos-2 and lageos-2 are both cases"),
+        (["determine", "page.html"], "page.html: the file is a page (HTML)"),
+        (["compare", B612, "--sigma", "1m"], f"{B612}: --sigma is for files of tracking"),
+        (["compare", B612, "--title", "x"], "--title is of what --report DIR writes"),
+        (["compare", B612, "--report", "none/such"], "none/such: no folder can be made there: there is no folder none"),
+        (["study", B612, "--figures", ""], "'' is no folder"),
+        (["ephemeris", "x.oem", "--from", "7090", "--when", "2016-02-12Z .. +1h", "--mask", "5deg"], "--mask is of passes"),
+        (
+            ["ephemeris", "x.oem", "--from", "7090", "--when", "2016-02-12Z .. +1h", "--passes", "--mask", "95deg"],
+            "--mask is 95 deg; an elevation is from -90 to below 90 deg",
+        ),
+    ],
+)
+def test_what_would_do_nothing_or_is_of_another_kind(call, tmp_path, monkeypatch, arguments, words):
+    """What can only be a mistake is refused in one line, and the tracking of the package goes by its name there."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "page.html").write_text("<!DOCTYPE html>\n<title>x</title>\n")
+    assert words in call(*arguments).refused()
+    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
+
+
+def test_what_a_file_says_itself_is_told(call):
+    """Ranges of lasers are of the way there and back by their format: a word for it is of no use."""
+    assert call("tracking", "lageos-2", "--range", "two-way", "--json").said == [
+        "piazzi: --range changes nothing: lageos-2 says it itself, or measures nothing of the kind"
+    ]

@@ -7,6 +7,7 @@ import pytest
 
 import piazzi as pz
 from piazzi import earth
+from piazzi.cli.courses import course_of as propagated
 from piazzi.determination import Guess
 from piazzi.determination.course import course_of
 from piazzi.determination.determining import prepared, solved
@@ -187,6 +188,10 @@ def test_a_file_of_a_determination_says_the_same(found, tmp_path):
         assert there["declination"] == pytest.approx(here["declination"], abs=1e-11)
         assert there["along_track_sigma"] == pytest.approx(here["along_track_sigma"], rel=1e-6)
         assert there["ellipse_major"] == pytest.approx(here["ellipse_major"], rel=1e-6)
+        carried = propagated(str(tmp_path / name), None, None, None).at(np.array([-3600.0, 7200.0]))
+        for k, epoch in enumerate((found.epoch - 3600.0, found.epoch + 7200.0)):
+            assert carried.mean[k, :3] == pytest.approx(found.orbit.at(epoch)[:3], abs=1e-4)
+            assert carried.covariance[k] == pytest.approx(found.orbit.covariance(epoch), rel=1e-5, abs=1e-9)
     json.dumps(here.to_dict(), allow_nan=False)
 
 

@@ -128,7 +128,7 @@ def test_what_a_file_says_is_not_overridden():
         ({"interval": -1}, "positive"),
         ({"time": "BER=GPST"}, "'GPST' is no time scale"),
         ({"sigma": "rang=1m"}, "rang"),
-        ({"sigma": "range=1s"}, "range has the unit s"),
+        ({"sigma": "range=1s"}, "1s is no sigma of range: write it as range=1m"),
         ({"sigma": "-1m"}, "must be positive"),
         ({"sigma": "much"}, "cannot be read"),
     ],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 import click
-from click.shell_completion import CompletionItem
+from click.shell_completion import CompletionItem, FishComplete, add_completion_class
 
 FILE, FOLDER = "file", "dir"
 
@@ -45,6 +45,15 @@ OFFERED: dict[str, tuple[Callable[[], Iterable[str]], str]] = {
     **dict.fromkeys(("TRACKING...", "FILE..."), (_cases, FILE)),
     "stations": (_stations, FILE),
 }
+
+
+class _Fish(FishComplete):
+    """Whole lines of help: the script of click ends them at the first comma."""
+
+    source_template = FishComplete.source_template.replace('string split ","', 'string split -m 1 ","')
+
+
+add_completion_class(_Fish, "fish")
 
 
 class Completed(click.types.StringParamType):

@@ -22,7 +22,8 @@ MOST = 10**7  # states
 class Course:
     """An orbit and what moves it.
 
-    `is_orbit`: its states are those of an orbit about the Earth in the GCRF; `uncertain`: it has a covariance.
+    `is_orbit`: its states are those of an orbit about the Earth in the GCRF; `uncertain`: it has a covariance; `beliefs` are
+    states and covariances of a determination at times, whose constants are correlated with the orbit.
     """
 
     name: str
@@ -33,15 +34,29 @@ class Course:
     is_orbit: bool
     uncertain: bool
     times: Array | None = None
+    beliefs: Any = None
+
+    def at(self, times: Array) -> Any:
+        """The `Propagation` to these times."""
+        from piazzi.estimate.propagation import Propagation, propagate
+
+        if self.beliefs is None:
+            return propagate(self.problem, times)
+
+        class Believed(Propagation):
+            names = STATES
+
+        return Believed(self.problem, times, *self.beliefs(times))
+
+    @property
+    def dated(self) -> bool:
+        """Whether it is an orbit with dates, as an ephemeris holds."""
+        return self.is_orbit and self.problem.epoch is not None
 
     def ephemeris(self, found: Any, frame: str) -> Any:
-        """The propagated states as an ephemeris; raises ValueError for a scenario that is no orbit with dates."""
+        """The propagated states as an ephemeris, where it is `dated`."""
         from piazzi.orbit.predicted import ephemeris_of
 
-        if not self.is_orbit or self.problem.epoch is None:
-            raise ValueError(
-                "an OEM holds orbits: states x, y, z, vx, vy, vz with dates; this scenario has others, write .csv or .nc"
-            )
         x = [found.names.index(name) for name in STATES]
         t, first = np.unique(found.times, return_index=True)
         P = found.covariance[first][:, x][:, :, x] if self.uncertain else None
@@ -64,6 +79,7 @@ def course_of(text: str, forces: str | None, begin: str | None, chosen: str | No
         raise click.UsageError("ORBIT is empty", click.get_current_context(silent=True))
     if text.lower().endswith(".toml") or (text in names() and not os.path.exists(text)):
         return _of_scenario(text, forces)
+    from piazzi.determination.course import determination_in
     from piazzi.determination.orbit_forces import COEFFICIENTS, with_sphere
     from piazzi.determination.words import date
     from piazzi.earth.defaults import default_forces, lowest_height, read_forces
@@ -71,6 +87,8 @@ def course_of(text: str, forces: str | None, begin: str | None, chosen: str | No
     from piazzi.kernels import RungeKutta8
     from piazzi.orbit.starting import start_of
 
+    if (facts := determination_in(text)) is not None:
+        return _of_determination(facts, text, forces)
     start = start_of(text, None if begin is None else date(begin, "--from"), chosen)
     height = lowest_height(start.state[:3], start.state[3:])
     choice = default_forces(height) if forces is None else read_forces(forces, height)
@@ -89,6 +107,18 @@ def course_of(text: str, forces: str | None, begin: str | None, chosen: str | No
         functions=choice.functions(start.epoch, choice.air(start.epoch, start.state)),
     )
     return Course(start.name, problem, start.source, str(choice), assumed, True, start.covariance is not None)
+
+
+def _of_determination(facts: Any, text: str, forces: str | None) -> Course:
+    from piazzi.determination.course import course_of
+    from piazzi.earth import Epoch
+
+    found = course_of(facts, Epoch.at(0.0), forces=forces, source=text)
+    if found.centre.name != "earth":
+        raise ValueError(f"{text}: positions of {found.name} are about the Sun; orbits about the Earth are propagated")
+    return Course(
+        found.name, found.problem, text, "those of the determination", found.assumed, True, True, beliefs=found.beliefs
+    )
 
 
 def _of_scenario(text: str, forces: str | None) -> Course:
@@ -141,4 +171,7 @@ def _time(problem: Problem, text: str, what: str, since: float) -> float:
             raise
     from piazzi.determination.words import date
 
-    return float(date(text, what) - problem.epoch)
+    try:
+        return float(date(text, what) - problem.epoch)
+    except ValueError as error:
+        raise ValueError(f"{error}; or write a length of time such as 6h or 3d") from None

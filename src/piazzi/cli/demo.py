@@ -39,6 +39,7 @@ def command(folder: str, kind: str, seed: int) -> int:
       piazzi demo -o figures --format pdf --seed 3
     """
     target = Path(folder)
+    output.make_folder(folder, "report.html")
     for name in PROBLEMS:
         output.make_folder(target / name, "comparison.json")
     from piazzi.present.report import comparison_tab

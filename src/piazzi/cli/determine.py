@@ -52,6 +52,12 @@ def command(files: tuple[str, ...], **given: Any) -> int:
     """
     read = files
     files, case = said_case(files, given)
+    for option, of in (("format", "figures"), ("width", "figures"), ("title", "report")):
+        if given[option] and getattr(case, of) is None:
+            raise click.UsageError(f"--{option} is of what --{of} DIR writes: add it", click.get_current_context())
+    for option in ("step", "anyway", "covariance"):
+        if given[option] and not case.output:
+            say(f"--{option} changes nothing: it is of the products that -o FILE writes")
     if case.each and case.object:
         raise click.UsageError("--object and --each do not go together", click.get_current_context())
     if output.STDOUT in files and not case.follow:

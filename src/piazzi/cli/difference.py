@@ -55,6 +55,7 @@ def command(
       piazzi difference a.oem b.oem --span "2016-02-13T16:00:00 UTC .." --json
     """
     output.check_output(output_file, PICTURES)
+    results.check_title(output_file, "-o FILE")
     from piazzi.orbit import difference
 
     found = difference(_orbit(first, seed), _orbit(second, seed), axes, _span(span), step=step, object=chosen, degree=degree)

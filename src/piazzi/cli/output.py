@@ -71,7 +71,7 @@ def check_output(path: str | None, endings: Sequence[str], option: str = "-o") -
         return
     if Path(path).suffix.lower() not in endings:
         raise click.UsageError(
-            f"{option} {path}: the file must end in {', '.join(endings)}", click.get_current_context(silent=True)
+            f"{option} {path or repr(path)}: the file must end in {', '.join(endings)}", click.get_current_context(silent=True)
         )
     check_place(path)
 
@@ -91,14 +91,17 @@ def check_place(path: str) -> None:
 
 
 def make_folder(path: str | os.PathLike[str], file: str) -> None:
-    """Make a folder, unless it is there; raises OSError where there can be none, or this file cannot be written in it."""
+    """Make a folder in one that is there; raises OSError where there can be none, or this file cannot be written in it."""
     folder = Path(path)
+    if not os.fspath(path):
+        raise click.UsageError(f"{os.fspath(path)!r} is no folder: name one", click.get_current_context(silent=True))
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(exist_ok=True)
     except (FileExistsError, NotADirectoryError) as error:
         raise NotADirectoryError(error.errno, "no folder can be made there: a file is in the way", os.fspath(path)) from None
     except OSError as error:
-        raise type(error)(error.errno, f"no folder can be made there: {error.strerror}", os.fspath(path)) from None
+        why = error.strerror if folder.parent.exists() else f"there is no folder {folder.parent}"
+        raise type(error)(error.errno, f"no folder can be made there: {why}", os.fspath(path)) from None
     check_place(os.fspath(folder / file))
 
 

@@ -38,9 +38,10 @@ def command(
 ) -> int:
     """Propagate ORBIT to other times, with its covariance.
 
-    ORBIT is a file of an orbit (OEM, OPM, OCM, SP3, CPF, TLE, OMM) or a scenario. Of several states the last with a
-    covariance is taken, or the one nearest to --from. Forces are chosen by the orbit's height and said, unless --forces names
-    them: words such as "gravity=EGM2008 degree=40 drag=exponential cd_a_m=0.02", behind "default" where they change that.
+    ORBIT is a determination (.json, .nc), a file (OEM, OPM, OCM, SP3, CPF, TLE, OMM) or a scenario. Of several states the last
+    with a covariance is taken, or the one nearest to --from. Forces are chosen by the orbit's height and said, unless --forces
+    names them: words such as "gravity=EGM2008 degree=40 drag=exponential cd_a_m=0.02", behind "default" where they change that.
+    A determination has its own.
     A scenario has forces, process noise and a prior of its own.
 
     Examples:
@@ -54,10 +55,12 @@ def command(
 
     frame_named(frame)
     course = course_of(orbit, forces, begin, chosen)
+    if (output_file or "").lower().endswith(".oem") and not course.dated:
+        raise ValueError(
+            "an OEM holds orbits: states x, y, z, vx, vy, vz with dates; this scenario has others, write .csv or .nc"
+        )
     times = span_of(course, begin, end, step)
-    from piazzi.estimate.propagation import propagate
-
-    found = propagate(course.problem, times)
+    found = course.at(times)
     if output_file is not None:
         _write(output_file, course, found, frame)
     told = to_dict(course, found, frame)
@@ -118,7 +121,7 @@ def _write(path: str, course: Course, found: Any, frame: str) -> None:
 
         write_dataset(path, found.to_dataset())
         return
-    if path.lower().endswith(".csv") and not (course.is_orbit and course.problem.epoch is not None):
+    if path.lower().endswith(".csv") and not course.dated:
         names = found.names
         rows = zip(found.times.tolist(), found.mean.tolist(), found.sigma.tolist(), strict=True)
         sigma = tuple(f"{name}_sigma" for name in names) if course.uncertain else ()

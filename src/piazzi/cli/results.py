@@ -54,6 +54,7 @@ class Outputs:
         """Refuse what could not be written, before anything is computed; raises click.UsageError, OSError."""
         output.check_output(self.output_file, ENDINGS)
         check_report(self.report)
+        check_title(self.report, "--report DIR")
 
     def write(self, result: Result, rows: Callable[[], Sequence[Mapping[str, Any]]], tab: Callable[[], Tab]) -> int:
         """Write and print a result; the exit status.
@@ -110,6 +111,12 @@ def given_title() -> str | None:
     """What --title says, None where it says nothing."""
     context = click.get_current_context(silent=True)
     return (context.meta.get(_TITLE) if context is not None else None) or None
+
+
+def check_title(path: str | None, option: str) -> None:
+    """Refuse a title of nothing; raises click.UsageError."""
+    if given_title() is not None and path is None:
+        raise click.UsageError(f"--title is of what {option} writes: add it", click.get_current_context(silent=True))
 
 
 def check_report(path: str | None) -> None:

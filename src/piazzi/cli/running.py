@@ -25,20 +25,22 @@ _LONGEST = 600
 def run(command: click.Command, arguments: Sequence[str] | None) -> int:
     """Call a command; returns its exit status, with every error told in one line on stderr."""
     _prepare_streams()
-    logger = logging.getLogger("piazzi.kernels")
-    handler = _Lines()
-    logger.addHandler(handler)
-    logger.setLevel(logging.INFO)
+    loggers = [logging.getLogger(name) for name in ("piazzi.kernels", "piazzi.formats")]
+    held: list[str] = []
+    handler = _Lines(held)
+    for logger in loggers:
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO)
     try:
         with warnings.catch_warnings():
-            held: list[str] = []
             warnings.showwarning = partial(_show_warning, held)
             status = _guarded(command, arguments)
-            for line in held if status != BAD_INPUT else ():  # a refusal stands alone
+            for line in dict.fromkeys(held) if status != BAD_INPUT else ():  # a refusal stands alone
                 say(line)
             return status
     finally:
-        logger.removeHandler(handler)
+        for logger in loggers:
+            logger.removeHandler(handler)
 
 
 def _guarded(command: click.Command, arguments: Sequence[str] | None) -> int:
@@ -86,7 +88,7 @@ def _status_and_message(error: Exception) -> tuple[int, str]:
         case click.ClickException():
             return BAD_INPUT, error.format_message()
         case OSError():
-            names = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, (str, bytes))]
+            names = [os.fsdecode(name) or "''" for name in (error.filename, error.filename2) if isinstance(name, (str, bytes))]
             return BAD_INPUT, ": ".join([*names[:1], error.strerror or str(error) or type(error).__name__])
         case ValueError():
             return BAD_INPUT, str(error)
@@ -131,7 +133,14 @@ def _show_warning(held: list[str], message: Warning | str, category: type[Warnin
 
 
 class _Lines(logging.Handler):
-    """Log records as lines on stderr."""
+    """Log records as lines on stderr: those of compilation at once, others as `_show_warning` holds what is put right."""
+
+    def __init__(self, held: list[str]) -> None:
+        super().__init__()
+        self._held = held
 
     def emit(self, record: logging.LogRecord) -> None:
-        say(record.getMessage())
+        if record.name.startswith("piazzi.kernels"):
+            say(record.getMessage())
+        else:
+            self._held.append(record.getMessage())

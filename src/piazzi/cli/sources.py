@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -42,10 +42,10 @@ def load_source(source: str, seed: int, scenario: str | None = None, recording: 
     """What `piazzi.loading` makes of a source, or of standard input for "-"; raises as that does."""
     from piazzi import load
     from piazzi.io.files import RECORDINGS
-    from piazzi.loading import is_tracking
+    from piazzi.loading import is_tracking, words_of
     from piazzi.scenarios import Recording
 
-    told: dict[str, Any] = {} if recording is None else {"scale": recording.scale, "columns": recording.columns}
+    told = {} if recording is None else words_of(recording)
     if not source:
         raise click.UsageError("SOURCE is empty", click.get_current_context(silent=True))
     if source.lower().endswith(".csv") and not scenario:

@@ -76,6 +76,7 @@ def command(
     if resume and output_file is None:
         raise click.UsageError("--resume needs -o FILE, the study to continue", click.get_current_context())
     results.check_report(report)
+    results.check_title(report or figures, "--report DIR or --figures FOLDER")
     if figures is not None:
         output.make_folder(figures, "study-nees.png")
     _check_scenario(scenario)
@@ -133,7 +134,7 @@ def _axis(text: str) -> tuple[str, list[str]]:
     name, equals, values = text.partition("=")
     found = [value.strip() for value in values.split(",")]
     if not equals or not name.strip() or not all(found):
-        raise click.UsageError(f"--vary {text!r}: write NAME=VALUE,VALUE,...", click.get_current_context())
+        raise click.UsageError(f"--vary {text!r}: write NAME=VALUE,VALUE,..., such as lag=10,100", click.get_current_context())
     return name.strip(), found
 
 

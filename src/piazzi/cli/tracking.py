@@ -42,6 +42,7 @@ def command(files: tuple[str, ...], output_file: str | None, target: str | None,
     """
     output.check_output(output_file, PICTURES)
     _check_target(target, files)
+    results.check_title(output_file, "-o FILE")
     from piazzi.formats import read_tracking
     from piazzi.formats.contents import summary
 

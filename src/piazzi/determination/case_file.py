@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from piazzi.determination.case import ANSWERS, OPTIONS, Case
+from piazzi.opening import told_path
 from piazzi.text import nearest, one_line, suggest
 
 SECTIONS = ("determine", "object", "product")
@@ -33,7 +34,7 @@ def split(given: Sequence[Any]) -> tuple[list[Any], Case]:
     if not cases:
         return list(given), Case()
     if len(cases) > 1:
-        raise ValueError(f"{os.fspath(cases[0])} and {os.fspath(cases[1])} are both cases: give one")
+        raise ValueError(f"{' and '.join(map(told_path, cases[:2]))} are both cases: give one")
     return [one for one in given if one is not cases[0]], read_case(cases[0])
 
 
@@ -71,14 +72,14 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     from piazzi.scenarios.loader import tables_of
     from piazzi.scenarios.table import ScenarioError
 
-    name = os.fspath(path)
+    name = told_path(path)
     tables, faults = tables_of(path)
     if faults:
         raise ScenarioError(name, list(faults))
     if not any(section in tables for section in SECTIONS):
         raise ValueError(f"{name} is no case: it has no section [determine], [object] or [product] (stations: --stations)")
     try:
-        return _told(tables, Path(name).parent)
+        return _told(tables, Path(path).parent)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
 

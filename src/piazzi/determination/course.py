@@ -72,13 +72,17 @@ class Course:
             for first, last in self.spans:
                 known |= (t >= first - 1e-6) & (t <= last + 1e-6)
             if not known.all():
+                ends = (float(t[~known][0]), self.spans[0][0], self.spans[-1][1])
+                at, begin, end = ((self.epoch + one).rounded(3) for one in ends)
                 raise ValueError(
-                    f"{self.source} has no state of {self.name or 'the object'} at {self.epoch + float(t[~known][0])}: it goes "
-                    f"from {self.epoch + self.spans[0][0]} to {self.epoch + self.spans[-1][1]} (piazzi propagate goes on)"
+                    f"{self.source} has no state of {self.name or 'the object'} at {at}: it goes from {begin} to {end} "
+                    "(piazzi propagate goes on)"
                 )
 
 
-def course_of(given: Any, near: Epoch, *, chosen: str | None = None, forces: Any = None, about: str = "earth") -> Course:
+def course_of(
+    given: Any, near: Epoch, *, chosen: str | None = None, forces: Any = None, about: str = "earth", source: str = ""
+) -> Course:
     """The orbit that is given.
 
     Parameters
@@ -88,25 +92,29 @@ def course_of(given: Any, near: Epoch, *, chosen: str | None = None, forces: Any
     chosen : name of the object in a file of several
     forces : of an orbit that is given by one state, as `determine` takes them; default by height
     about : what elements and states of text go about
+    source : of the object of a determination, its file
 
     Raises
     ------
     ValueError
-        Where it is no orbit.
+        Where it is no orbit, and for forces on one that is not given by one state.
     OSError
         Where a file cannot be read.
     """
     if hasattr(given, "setup") and hasattr(given, "estimate"):
         return _of_determination(given)
     if isinstance(given, Mapping):
-        return _of_document(given, "the determination")
+        _no_forces(forces, source or "the determination", "has its own")
+        return _of_document(given, source or "the determination")
     if isinstance(given, Guess) or (isinstance(given, str) and "=" in given and not os.path.exists(given)):
         guess = guess_of(given, near, about=about, where="ORBIT")
         return _of_state("", guess.epoch, guess.state, None, guess.source, forces, guess.assumed, guess.about)
     if isinstance(given, (str, os.PathLike)):
-        facts = _document(os.fspath(given))
+        facts = determination_in(os.fspath(given))
         if facts is not None:
-            return _of_document(facts, os.fspath(given))
+            return course_of(facts, near, forces=forces, source=os.fspath(given))
+    if about != "earth":
+        raise ValueError(f"--about {about} is of elements and states as text; {given} is not")
     return _of_orbit(given, near, chosen, forces)
 
 
@@ -119,7 +127,7 @@ def _of_determination(found: Any) -> Course:
     return Course(found.object, setup.problem, at, "the determination", setup.assumed, centre=setup.measured.centre)
 
 
-def _document(path: str) -> Mapping[str, Any] | None:
+def determination_in(path: str) -> Mapping[str, Any] | None:
     """The object of a determination in a file of JSON or NetCDF; None for another file."""
     with opened_file(path) as file:
         start = file.read(512)
@@ -257,6 +265,7 @@ def _of_orbit(given: Any, near: Epoch, chosen: str | None, forces: Any) -> Cours
             place, speed = sgp4_states(mean_elements, [mean_elements.epoch + float(x) for x in t], "GCRF")
             return np.hstack([place, speed]), None
 
+        _no_forces(forces, source, "goes by SGP4")
         said, days = ["by SGP4, which has no covariance"], abs(near - mean_elements.epoch) / 86400.0
         if days > OLD:
             said.append(f"elements that are {days:,.0f} days away, though SGP4 loses kilometres in a few days")
@@ -266,7 +275,14 @@ def _of_orbit(given: Any, near: Epoch, chosen: str | None, forces: Any) -> Cours
     if sum(int(np.isfinite(arc.position).all(axis=1).sum()) for arc in found) < 2:
         start = start_of(what, near, chosen)
         return _of_state(start.name, start.epoch, start.state, start.covariance, source, forces)
+    _no_forces(forces, source, "has rows of its own")
     return _of_rows(name, found, source, start_of(what, near, chosen), forces)
+
+
+def _no_forces(forces: Any, source: str, why: str) -> None:
+    """Raise ValueError where forces are asked for that nothing would come of."""
+    if forces is not None:
+        raise ValueError(f"--forces is for orbits that are given by one state; {source} {why}")
 
 
 def _of_rows(name: str, arcs: Sequence[Any], source: str, start: Any, forces: Any) -> Course:

@@ -28,8 +28,8 @@ from piazzi.determination.holding import NONE, Held, held, unasked
 from piazzi.determination.initial import initial_orbits
 from piazzi.determination.initial_result import InitialOrbits
 from piazzi.determination.instruments import with_instruments
-from piazzi.determination.orbit_forces import Chosen, chosen_forces, orientation_of
-from piazzi.determination.partners import Partner, partners_of, with_partners
+from piazzi.determination.orbit_forces import Chosen, check_forces, chosen_forces, orientation_of
+from piazzi.determination.partners import Partner, check_partners, partners_of, with_partners
 from piazzi.determination.products import check_writable
 from piazzi.determination.pseudoranges import positions
 from piazzi.determination.result import Determination
@@ -173,9 +173,13 @@ def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[[Guess], 
     """What was measured, the forces on an orbit, where to begin where somebody says it, and the orbit of before."""
     wanted, burns = asked(case.estimate, case.consider), burns_of(case.manoeuvre)
     partners = partners_of(case.participant)
-    rows = of_object(with_partners(observations_of(files, case.answers), partners), case.object)
+    everything = observations_of(files, case.answers)
+    check_partners(everything, partners, case.stations)
+    rows = of_object(with_partners(everything, partners), case.object)
     rows, earlier = _beside_prior(rows, case)
     seen, begin = _seen(rows, case, earlier, any(one.what.kind == CLOCK for one in wanted), partners)
+    if seen.about != "sun":
+        check_forces(case.forces)  # an orbit that they are for may be long in coming
     seen = oriented(seen, orientation_of(case.forces))
     seen = with_instruments(seen, [one for one in wanted if one.what.kind in INSTRUMENTS])
 

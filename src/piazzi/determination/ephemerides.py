@@ -203,8 +203,11 @@ def ephemeris(
     width = positive_duration(step, "--step") if isinstance(step, str) else float(step)
     if not width > 0.0:
         raise ValueError(f"step is {width:g} s; it must be positive")
+    if mask is not None and not (passes and -np.pi / 2 <= mask < np.pi / 2):
+        size = f"is {np.degrees(mask):g} deg; an elevation is from -90 to below 90 deg"
+        raise ValueError(f"--mask {size if passes else 'is of passes: add --passes'}")
     if frequency is not None and not 0.0 < frequency < np.inf:
-        raise ValueError(f"frequency is {frequency:g} Hz; it must be positive")
+        raise ValueError(f"--frequency is {frequency:g} Hz; it must be positive")
     if not passes and (last - first) / width > MOST:
         raise ValueError(f"--when with --step {width:g} s makes {(last - first) / width:,.0f} rows; at most {MOST:,} are made")
     course = course_of(orbit, first, chosen=object, forces=forces, about=about)

@@ -117,6 +117,11 @@ def orientation_of(given: Any) -> Orientation | None:
     return None
 
 
+def check_forces(given: Any) -> None:
+    """Raise ValueError or OSError for forces about the Earth that there are not, at whatever height."""
+    _choice(given, np.array([7.5e6, 0.0, 0.0, 0.0, 7.3e3, 0.0]))
+
+
 def air_varies(height: float, weather: bool) -> AirVaries:
     """Grows with height, as the Sun's activity matters more there; less where space weather is followed."""
     share = float(np.interp(height, (300e3, 800e3), (0.2, 0.5)))
@@ -153,6 +158,9 @@ def _coefficients(
     own = {*COEFFICIENTS.values(), *accelerations}
     assumed = [text for text in choice.assumed if text.partition(" = ")[0] not in own]
     ratio, sphere = _ratio(name, mass, area)
+    if open_ & {*COEFFICIENTS.values()} and (mass is None) != (area is None):
+        told, lost = ("mass", "area") if area is None else ("area", "mass")
+        assumed.append(f"--{told} alone says nothing of drag and sunlight, as --{lost} is not given")
     for parameter, coefficient in (("cr_a_m", CR), ("cd_a_m", CD)):
         if parameter not in open_:
             continue

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.course import HDF5, JSON, course_of
-from piazzi.determination.sites import ABOARD, aboard
+from piazzi.determination.sites import ABOARD, aboard, matched, sites_of
 from piazzi.earth import Epoch
 from piazzi.earth.constants import SPEED_OF_LIGHT
 from piazzi.formats import Ephemeris, Observations, read_ephemeris
@@ -18,7 +18,7 @@ from piazzi.opening import opened as opened_file
 from piazzi.orbit.paths import opened, path_of
 from piazzi.outside.table import Table
 from piazzi.problem.checks import Array
-from piazzi.text import brief
+from piazzi.text import brief, listed
 
 STEP = 60.0  # s, of the table that stands for an orbit
 MORE = 8.0  # steps of it beyond the rows, where the ephemeris goes on
@@ -120,7 +120,11 @@ def partners_of(given: Any) -> dict[str, Partner]:
 
 def _split(text: Any) -> tuple[str, Any]:
     name, equals, path = text.partition("=") if isinstance(text, str) else ("", "", text)
-    return (name.strip(), path) if equals and not os.path.exists(text) else ("", text)
+    if not equals or os.path.exists(text):
+        return "", text
+    if not name.strip() or not path.strip():
+        raise ValueError(f"--participant {text[:_NAME]!r}: write NAME=FILE, or FILE alone")
+    return name.strip(), path
 
 
 def _read(name: str, orbit: Any) -> dict[str, Partner]:
@@ -140,6 +144,22 @@ def _read(name: str, orbit: Any) -> dict[str, Partner]:
     chosen = name if name in orbit.objects or name in identifiers else None
     opened(orbit, chosen)
     return {name: Partner(name, orbit, chosen)}
+
+
+def check_partners(rows: Observations, partners: Mapping[str, Partner], stations: Any) -> None:
+    """Raise ValueError for participants of which the tracking knows nothing, and for the object itself among them."""
+    if not partners:
+        return
+    own = {name: np.flatnonzero(rows.object == k) for k, name in enumerate(rows.participants) if name in partners}
+    if not {*rows.participants} & partners.keys():
+        raise ValueError(f"--participant {listed(partners)}: the tracking does not name it: it has {listed(rows.participants)}")
+    lasers = any(segment.wavelength is not None for segment in rows.segments)
+    sites = sites_of("ilrs" if lasers and stations is None else stations)
+    for name, there in own.items():
+        observers = {rows.participants[k] for k in np.unique(rows.station[there]) if k >= 0} - partners.keys()
+        ground = sorted(one for one in observers if sites is not None and matched(one, sites))
+        if ground:
+            raise ValueError(f"--participant {name}: that is what {listed(ground)} measured, the object itself: leave it out")
 
 
 def with_partners(rows: Observations, partners: Mapping[str, Partner]) -> Observations:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -12,7 +13,7 @@ import numpy as np
 from piazzi.earth import Epoch, Place, Station, StationList, Weather, ilrs_stations, mpc_stations, read_stations
 from piazzi.formats import TAGS, Observations
 from piazzi.problem.checks import Array
-from piazzi.text import nearest
+from piazzi.text import nearest, suggest
 
 ABOARD = "aboard"  # column of rows that the object itself received
 OWN = {"ilrs": ilrs_stations, "mpc": mpc_stations}  # lists of stations that have a name
@@ -138,6 +139,8 @@ def sites_of(given: Any) -> StationList | None:
         elif isinstance(item, str) and item in OWN:
             found += OWN[item]().stations
         else:
+            if isinstance(item, str) and not os.path.exists(item) and (hint := suggest(item, OWN)):
+                raise FileNotFoundError(errno.ENOENT, f"{os.strerror(errno.ENOENT)}{hint}", item)
             files.append(item)
     if files:
         found += read_stations(*files).stations

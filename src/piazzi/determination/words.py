@@ -31,13 +31,13 @@ def pairs(text: str, what: str, known: tuple[str, ...], example: str) -> dict[st
 
 def quantity(text: str, unit: str, what: str) -> float:
     """A number joined to its unit, in SI; a plain number where `unit` is ""."""
-    match = _NUMBER.fullmatch(text.strip())
+    match, short = _NUMBER.fullmatch(text.strip()), what.rpartition(": ")[2]
     if match is None or not isfinite(value := float(match[1])):
-        raise ValueError(f"{what} is {one_line(text, 60)!r}; write a number joined to its unit, such as {what}=1{unit}")
+        raise ValueError(f"{what} is {one_line(text, 60)!r}; write a number joined to its unit, such as {short}=1{unit}")
     said = match[2].strip()
     if not said and unit:
         raise ValueError(
-            f"{what} is {one_line(text, 60)!r}, without a unit: write such as {what}={one_line(match[1], 40)}{unit}"
+            f"{what} is {one_line(text, 60)!r}, without a unit: write such as {short}={one_line(match[1], 40)}{unit}"
         )
     try:
         found = Units().unit(said or "1")

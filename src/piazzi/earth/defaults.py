@@ -147,11 +147,11 @@ def read_forces(text: str, height: float) -> ForceChoice:
         Where a file cannot be read.
     """
     words = text.split()
-    if words in ([], ["default"]):
+    if words == ["default"]:
         return default_forces(height)
     if words == ["none"]:
         return ForceChoice(Forces(degree=0, bodies=(), tides=(), relativity=False), "two bodies")
-    if len(words) == 1 and "=" not in text:
+    if len(words) < 2 and "=" not in text:
         if not text.lower().endswith(".toml"):
             raise ValueError(
                 f"forces {text[:60]!r}: write default, none, a file .toml with [earth], or words such as "

@@ -149,7 +149,11 @@ class Epoch(Shown):
         return (self.whole, self.fraction) < (other.whole, other.fraction)
 
     def __str__(self) -> str:
-        return self.to("UTC" if self.whole >= -1262304000.0 else "TT")
+        return self.rounded(9)
+
+    def rounded(self, digits: int) -> str:
+        """The date in UTC, before 1960 in TT, with at most so many decimals."""
+        return self.to("UTC" if self.whole >= -1262304000.0 else "TT", digits=digits)
 
     def __repr__(self) -> str:
         return f"Epoch({str(self)!r})"

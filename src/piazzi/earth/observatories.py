@@ -57,9 +57,9 @@ def _of_text(path: Path, text: str) -> Iterator[_Row]:
 def _of_json(path: Path, text: str) -> Iterator[_Row]:
     try:
         found = json.loads(text)
-        rows = [(str(code), dict(entry)) for code, entry in found.items()]
-    except (ValueError, TypeError, RecursionError) as error:
-        raise ValueError(f"{path.name}: no list of observatory codes: {error}") from None
+        rows = [(str(code), {**entry}) for code, entry in found.items()]
+    except (AttributeError, ValueError, TypeError, RecursionError):
+        raise ValueError(f"{path.name}: no list of observatory codes, each with Longitude, cos and sin") from None
     for code, entry in rows:
         cells = tuple("" if entry.get(key) is None else str(entry[key]) for key in ("Longitude", "cos", "sin"))
         yield code, cells, str(entry.get("Name", "")), f"{path.name}, code {code}"

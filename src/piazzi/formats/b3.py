@@ -46,8 +46,6 @@ def read(data: bytes, name: str, told: Conventions) -> Observations:
     try:
         shifts = contradictions(_ranges(lines))
         mend = told.option("repair") == "exponent"
-        if told.option("repair") not in (None, "exponent"):
-            raise ValueError(f"repair {told.option('repair')!r} is not known; exponent is")
         for number_of_line, line in enumerate(lines, 1):
             if line.strip():
                 _observation(rows, line.rstrip(), number_of_line, shifts.get(number_of_line, 0), mend)

@@ -99,6 +99,8 @@ class Conventions:
             raise ValueError(f"axes {frame!r} are none of {', '.join(KNOWN)}{suggest(frame, KNOWN)}")
         scales = tuple(_scale(text) for text in (*_texts(time), *_texts(scale)))
         names = parse_columns(columns) if isinstance(columns, str) else columns or {}
+        if words.get("repair") not in (None, "exponent"):
+            raise ValueError(f"--repair {words['repair']!r} is not known; exponent is")
         named = {ours: theirs if isinstance(theirs, str) else ",".join(map(str, theirs)) for ours, theirs in names.items()}
         sigmas = tuple(_sigma(text) for text in _texts(sigma))
         seconds = None if interval is None else float(interval)
@@ -127,8 +129,8 @@ class Conventions:
 
 def _word(name: str, word: Any) -> str | None:
     if word is not None and word not in WORDS[name]:
-        what = name.replace("_", " ")
-        raise ValueError(f"{what} is one of {', '.join(WORDS[name])}, not {word!r}{suggest(str(word), WORDS[name])}")
+        what = name.replace("_", "-")
+        raise ValueError(f"--{what} is one of {', '.join(WORDS[name])}, not {word!r}{suggest(str(word), WORDS[name])}")
     return None if word is None else str(word)
 
 
@@ -165,7 +167,9 @@ def _sigma(text: str) -> Sigma:
         raise ValueError(f"sigma {text!r} must be positive")
     kinds = tuple(name for name in KINDS if not KINDS[name].auxiliary and _powers(name) == unit.powers)
     if not kinds or (kind is not None and kind not in kinds):
-        raise ValueError(f"sigma {text!r}: {kind or 'no measurement'} has the unit {match['unit'] or '1'}, as in range=10m")
+        right = f"{kind}=1{KINDS[kind].unit}" if kind else "range=10m"
+        size = match["number"] + (match["unit"] or " without a unit")
+        raise ValueError(f"sigma {text!r}: {size} is no sigma of {kind or 'any measurement'}: write it as {right}")
     return Sigma((kind,) if kind else kinds, match["station"], value)
 
 
@@ -193,6 +197,20 @@ def with_conventions(observations: Observations, told: Conventions) -> Observati
     answered |= {"--sigma"} if all_known else set()
     left = tuple(text for text in observations.open if answered.isdisjoint(_OPTION.findall(text)))
     return replace(observations, segments=segments, open=left, sigma=sigma, tag=_tags(observations, told))
+
+
+def without_effect(rows: Observations, told: Conventions) -> list[str]:
+    """Options that `with_conventions` makes no difference by: the files say it, or have nothing that it is of."""
+    found, nothing, out = with_conventions(rows, told), Conventions(), []
+    options = {name: name.replace("_", "-") for name in (*WORDS, "frame", "interval")}
+    for name, option in {**options, "range_units": "range-unit", "sigmas": "sigma"}.items():
+        if getattr(told, name) == getattr(nothing, name):
+            continue
+        left = with_conventions(rows, replace(told, partial=True, **{name: getattr(nothing, name)}))
+        columns = ((left.sigma, found.sigma), (left.tag, found.tag), (left.value, found.value))
+        if left.segments == found.segments and all(np.array_equal(a, b, equal_nan=True) for a, b in columns):
+            out.append(f"--{option}")
+    return out
 
 
 def with_usual_sigmas(observations: Observations, told: Conventions, usual: Array | float, what: str) -> Observations:
@@ -256,9 +274,7 @@ def _sigmas(observations: Observations, told: Conventions) -> Array:
             if rule.station not in observations.participants:
                 if told.partial:
                     continue
-                raise ValueError(
-                    f"sigma for {rule.station!r}: no such station{nearest(rule.station, observations.participants)}"
-                )
+                raise ValueError(f"sigma for {rule.station!r}: no such station{nearest(rule.station, observations.stations)}")
             rows = rows & (observations.station == observations.participants.index(rule.station))
         sigma[rows] = rule.value
     return sigma

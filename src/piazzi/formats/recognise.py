@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -10,12 +11,14 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from piazzi.formats import table_header
-from piazzi.formats.conventions import Conventions, with_conventions
+from piazzi.formats.conventions import Conventions, with_conventions, without_effect
 from piazzi.formats.ephemeris import Ephemeris
 from piazzi.formats.frames import settled
 from piazzi.formats.observations import Observations
 from piazzi.formats.source import read_bytes
+from piazzi.opening import told_path
 
+_log = logging.getLogger(__name__)
 HEAD = 4096  # bytes that a format is told by
 
 
@@ -92,6 +95,9 @@ FORMATS: Mapping[str, Format] = {  # name: how it is told, who reads it
 }
 
 
+_READ_BY = {"repair": ("B3",), "debias": ("MPC", "ADES", "ADES XML")}  # options that readers take, not `with_conventions`
+
+
 def recognise(data: bytes) -> str | None:
     """Name of the format in `FORMATS` that some bytes are of, None where they are of none."""
     head = data[:HEAD]
@@ -119,7 +125,15 @@ def read_tracking(*paths: str | os.PathLike[str], **conventions: Any) -> Observa
     from piazzi.formats.joining import concatenate
 
     told = Conventions.of(**conventions)
-    return with_conventions(concatenate(_tracking(path, told) for path in paths), told)
+    forms: list[Format] = []
+    rows = concatenate(_tracking(path, told, forms) for path in paths)
+    first = told_path(paths[0])
+    if told.columns and FORMATS[TABLE] not in forms:
+        raise ValueError(f"--columns says what columns of tables are: {first} is none")
+    unread = [f"--{name}" for name, of in _READ_BY.items() if told.option(name) and not any(FORMATS[k] in forms for k in of)]
+    for option in (*unread, *without_effect(rows, told)):
+        _log.info("%s changes nothing: %s says it itself, or measures nothing of the kind", option, first)
+    return with_conventions(rows, told)
 
 
 def tracking_of(data: bytes, name: str, **conventions: Any) -> Observations:
@@ -131,8 +145,11 @@ def tracking_of(data: bytes, name: str, **conventions: Any) -> Observations:
     return with_conventions(_of_format(data, _format(data, name, bool(told.columns)), name, told), told)
 
 
-def _tracking(path: str | os.PathLike[str], told: Conventions) -> Observations:
-    return _of_format(*_opened(path, bool(told.columns)), told)
+def _tracking(path: str | os.PathLike[str], told: Conventions, forms: list[Format]) -> Observations:
+    """Measurements of a file, whose format goes among `forms`."""
+    data, form, name = _opened(path, bool(told.columns))
+    forms.append(form)
+    return _of_format(data, form, name, told)
 
 
 def _of_format(data: bytes, form: Format, name: str, told: Conventions) -> Observations:
@@ -170,7 +187,7 @@ def read_ephemeris(path: str | os.PathLike[str], **conventions: Any) -> Ephemeri
 
 def _opened(path: str | os.PathLike[str], named: bool = False) -> tuple[bytes, Format, str]:
     """Contents, format and name of a file; where columns are `named`, whatever is of no other format is a table."""
-    name, data = os.fspath(path), read_bytes(path)
+    name, data = told_path(path), read_bytes(path)
     return data, _format(data, name, named), name
 
 
@@ -178,11 +195,15 @@ def _format(data: bytes, name: str, named: bool) -> Format:
     if not data or data.isspace():
         raise ValueError(f"{name}: the file is empty")
     found = recognise(data)
+    if found is None and b"<!doctype html" in data[:HEAD].lower():
+        raise ValueError(f"{name}: the file is a page (HTML), and holds neither tracking nor an orbit")
     if found is None and (doctype := data[:HEAD].find(b"<!DOCTYPE")) >= 0:
         line = data.count(b"\n", 0, doctype) + 1
         raise ValueError(f"{name}: line {line}: the file has a DOCTYPE, which may name other files; it is not read")
     if found is None and named:
         found = TABLE
+    if found is None and data[:1] == b"{" and b"piazzi.determine/" in data[:HEAD]:
+        raise ValueError(f"{name}: the file is a determination: piazzi propagate {name} -o orbit.oem makes a file of its orbit")
     if found is None:
         parted = any(mark in data[:HEAD] for mark in b",;\t")
         hint = '; of a table say the columns, as --columns "time=T range=RNG[km]"' if parted else ""

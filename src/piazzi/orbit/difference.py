@@ -176,7 +176,8 @@ def _times(paths: tuple[Path, Path], limits: list[Any], step: float | None) -> A
     if step is not None and not step > 0.0:
         raise ValueError(f"step is {step:g} s; it must be positive")
     if not low <= high:
-        raise ValueError(f"the span ends {low - high:g} s before it begins")
+        told = f"the span ends {low - high:g} s before it begins" if None not in limits else "there are no rows within the span"
+        raise ValueError(told)
     if step is not None or not len(rows):
         width = (high - low) / (_STEPS - 1) if step is None else step
         rows = low + width * np.arange(int((high - low) / width + 1e-9) + 1) if width > 0.0 else np.array([low])

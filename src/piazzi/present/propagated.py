@@ -31,8 +31,7 @@ class Propagated:
         yield f"{found['object']}: {found['count']:,} states, {span}"
         yield f"From {found['source']}"
         yield f"Forces: {found['forces']}"
-        if found["assumed"]:
-            yield f"Assumed: {', '.join(found['assumed'])}"
+        yield from (f"Assumed: {text}." for text in found["assumed"])
         yield ""
         yield f"{'at ' + _when(last):34s} {'':14s}" + ("  sigma" if "sigma" in last else "")
         for i, (name, unit) in enumerate(zip(found["names"], found["units"], strict=True)):

@@ -175,7 +175,8 @@ def position_at(ax: Axes, estimates: Mapping[tuple[str, str], Estimate], k: int 
     against = "truth" if known else "first estimate"
     ax.set_xlabel(show.label(plain(f"{names_of_states[i]} - {against}")))
     ax.set_ylabel(show.label(plain(f"{names_of_states[j]} - {against}")))
-    ax.set_title(f"3-sigma ellipses at t = {first.times[k]:g} s")
+    when = f"t = {first.times[k]:g} s" if first.epoch is None else (first.epoch + float(first.times[k])).rounded(0)
+    ax.set_title(f"3-sigma ellipses at {when}")
     return ax
 
 
