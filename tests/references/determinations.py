@@ -1,7 +1,7 @@
 """Simulated determinations whose truth is drawn from what is assumed before: consistency of every estimated value.
 
 ``python -m tests.references.determinations KIND N`` prints the mean NEES over N runs of a kind, leo, geo or gto; of air,
-process and other that of predictions, along R, T and N after one, two and three days.
+process and other that of predictions, along R, T and N after one, two and three days, and the share within 95 %.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 import piazzi as pz
 from piazzi import earth
 from piazzi.determination import Guess
-from piazzi.determination.case import Case
-from piazzi.determination.determining import prepared, ready, solved
+from piazzi.determination.beliefs import beliefs
+from piazzi.determination.determining import _answered, prepared, ready, solved
 from piazzi.determination.fit import estimators
 from piazzi.determination.orbit_forces import AirVaries
 from piazzi.determination.physical import share_of, value_of
-from piazzi.determination.setup import follow
+from piazzi.determination.setup import at_last_used, follow
 from piazzi.earth.tabulated import Place
 from piazzi.estimate.chi_square import quantile
 from piazzi.evaluate.information import predicted
@@ -184,10 +184,16 @@ def flown(given, first, times, share):
 
 
 def predictions(kind, count, other=None, days=(1, 2, 3), first=0):
-    """NEES per axis R, T, N (count, days, 3) of predictions, where the density of the truth varies, or is another model's."""
+    """NEES per axis R, T, N (count, days, 3) of predictions, where the density of the truth varies, or is another model's.
+
+    The truth is drawn from what the determination believes before.  Errors are those along the curved orbit, on the axes where
+    the prediction stands, for which its covariance is: 40 km along the track are 120 m of the straight line's height.
+    """
     given = begun(kind)
     truth = given if other is None else begun(other)
     names, law = truth.problem.model.names, given.chosen.air_varies or AirVaries(0.32, 86400.0)
+    place = names.index("cd_a_m_share")
+    before, spread = truth.problem.mean[place], np.sqrt(truth.problem.covariance[place, place])
     rows, last = given.tracking.times, float(given.tracking.times[-1])
     ahead = np.array([last + 86400.0 * day for day in days])
     times = np.concatenate([rows, ahead])
@@ -201,17 +207,26 @@ def predictions(kind, count, other=None, days=(1, 2, 3), first=0):
             share[k] = left * share[k - 1] + law.sigma * np.sqrt(1 - left**2) * rng.standard_normal()
         start = truth.states[0].copy()
         start[:6] += np.repeat(kind.off, 3) * rng.standard_normal(6)
-        start[names.index("cd_a_m_share")] = 1.0 + 0.3 * rng.standard_normal()
+        start[place] = before + spread * rng.standard_normal()
         states = flown(truth, start, times, share if other is None else 0.0 * share)
         z = predicted(truth.problem, prepare(truth.problem, truth.tracking), states[: len(rows)])
         z = z + kind.sigma * rng.standard_normal(z.shape)
         tracking = pz.Tracking(given.tracking.row_times, z, given.tracking.row_stations, epoch=given.tracking.epoch)
-        found = solved(ready(replace(given, tracking=tracking)), estimators(("graph",)), case=Case(hold="none"))
-        mean, roots = found.orbit.states([given.measured.epoch + t for t in ahead.tolist()])
-        axes = np.array([state_axes(x[:3], x[3:6])[:3, :3] for x in states[len(rows) :]])
-        error = np.einsum("kij,kj->ki", axes, mean[:, :3] - states[len(rows) :, :3])
-        out.append(error**2 / np.sum((axes @ roots[:, :3]) ** 2, axis=2))
+        near = ready(replace(given, tracking=tracking))
+        keep, _, answer, _ = _answered(near, estimators(("graph",))["graph"])
+        near = at_last_used(near, keep)
+        mean, P = beliefs(near, answer, [near.measured.epoch + t for t in ahead.tolist()])
+        out.append(curved(mean, P, states[len(rows) :]))
     return np.array(out)
+
+
+def curved(mean, covariance, truth):
+    """Squared errors in sigma (K, 3) in height, along the curved orbit and across it, on axes of the mean (K, 6)."""
+    axes = np.array([state_axes(x[:3], x[3:6])[:3, :3] for x in mean])
+    r, (x, y, z) = np.linalg.norm(mean[:, :3], axis=1), np.einsum("kij,kj->ik", axes, truth[:, :3])
+    distance = np.linalg.norm(truth[:, :3], axis=1)
+    error = np.stack([distance - r, np.arctan2(y, x) * r, np.arcsin(z / distance) * r], axis=1)
+    return error**2 / np.einsum("kij,kjl,kil->ki", axes, covariance[:, :3, :3], axes)
 
 
 def within(values, degrees, sure=0.9995):
@@ -229,13 +244,15 @@ def main(name, count):
         print(f"{name:4} {label:50} {mean / d:6.3f}  {'in' if ok else 'OUT'}")
 
 
-def main_predictions(name, count):
+def main_predictions(name, count, first=0):
     kinds = {"air": (AIR, None), "process": (PROCESS, None)}
     kinds["other"] = AIR, replace(AIR, forces=AIR.forces.replace("harris-priester", "exponential air_height=450000"))
-    found = predictions(kinds[name][0], count, kinds[name][1])
+    found = predictions(kinds[name][0], count, kinds[name][1], first=first)
     for k, day in enumerate((1, 2, 3)):
-        print(f"{name:8} {day} d  " + "  ".join(f"{a} {m:7.3f}" for a, m in zip("RTN", found[:, k].mean(axis=0), strict=True)))
+        shares = (found[:, k] < quantile(0.95, 1)).mean(axis=0)
+        told = (f"{a} {m:7.3f} {s:4.0%}" for a, m, s in zip("RTN", found[:, k].mean(axis=0), shares, strict=True))
+        print(f"{name:8} {day} d  " + "  ".join(told))
 
 
 if __name__ == "__main__":
-    (main if sys.argv[1] in KINDS else main_predictions)(sys.argv[1], int(sys.argv[2]))
+    (main if sys.argv[1] in KINDS else main_predictions)(sys.argv[1], *map(int, sys.argv[2:]))

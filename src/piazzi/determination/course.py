@@ -18,10 +18,12 @@ from piazzi.determination.beliefs import beliefs, carried_to
 from piazzi.determination.centres import EARTH, Centre, centre_of
 from piazzi.determination.density import departed
 from piazzi.determination.guesses import CARTESIAN, SCHEMA, Guess, guess_of
+from piazzi.determination.motion import Extra, instead
 from piazzi.determination.orbit_forces import Chosen, chosen_forces
-from piazzi.determination.physical import DENSITY
+from piazzi.determination.physical import DENSITY, WAVES
 from piazzi.determination.sun_forces import forces_about_the_sun
 from piazzi.earth import EphemerisWarning, Epoch, Forces
+from piazzi.earth.force_text import LATITUDE
 from piazzi.earth.rotation import frame_named
 from piazzi.formats import read_ephemeris
 from piazzi.formats.ephemeris import MeanElements
@@ -34,6 +36,7 @@ from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 
 HDF5, JSON = b"\x89HDF", b"{"
+MEMORY = f"{DENSITY}time"  # over which what density departs by goes back to zero, s
 OLD = 10.0  # days from two-line elements, from which on it is said
 Beliefs = Callable[[Array], tuple[Array, Array | None]]
 
@@ -161,7 +164,7 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
         names = [str(name) for name in facts["names"]]
         P, mean = np.array(facts["covariance"], dtype=float), np.array(facts["mean"], dtype=float)
         said = {**facts["forces"]}
-        constants = {str(one["name"]) for one in facts["estimated"]}
+        before = {str(one["name"]): (one["prior"], one["prior_sigma"]) for one in facts["estimated"]}
         frame, name = str(facts["frame"]), str(facts.get("object") or "")
         dates = [Epoch(str(when)) - guess.epoch for when in facts.get("density") or ()]
         last = (facts.get("span") or {}).get("last")
@@ -171,10 +174,14 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
     if not (np.isfinite(P).all() and P.shape == (len(names), len(names)) and np.isfinite(mean).all()):
         raise ValueError(f"{source}: the determination has no finite covariance")
     chosen = _chosen(_forces_of(said, source, guess.about), guess.state, name, guess.about)
-    usual = float(mean[names.index("cd_a_m")]) if "cd_a_m" in names else 0.0
-    mean, P = _with_density(dates, names, mean, P)
-    own = [p for p in chosen.forces.parameters if p in constants and p in names]
+    varies, air = chosen.air_varies, _estimated_air(names, dates, before)
+    sigma = 0.0 if varies is None or "cd_a_m" not in names else varies.sigma * float(mean[names.index("cd_a_m")])
+    if varies is not None and air:
+        mean, P = _with_density(dates, names, mean, P)
+        chosen, sigma = _with_departure(chosen, air, varies.time), float(before["cd_a_m"][0] * before[air[0]][1])
+    own = [p for p in (*chosen.forces.parameters, *air) if p in before and p in names]
     roles = {p: role for p, role in chosen.roles.items() if p in own} | dict.fromkeys(own, "estimated")
+    roles |= dict.fromkeys([MEMORY] if MEMORY in chosen.values else [], "fixed")
     values: dict[str, Any] = {**_numbers(chosen)}
     values |= {p: Gaussian(mean[names.index(p)], max(P[names.index(p), names.index(p)], 1e-300)) for p in own}
     problem = _problem(chosen, roles, values, guess.epoch, guess.state, np.zeros((6, 6)), name)
@@ -186,7 +193,7 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
     assumed = tuple(str(text) for text in facts.get("assumed", ()))
     carry = _carrying(problem, chosen.max_step, first, moved)
     found = Course(name, problem, carry, source, assumed, centre=centre_of(guess.about))
-    return _departing(found, chosen, first, usual, behind, bool(dates))
+    return _departing(found, chosen, first, sigma, behind, MEMORY in chosen.values)
 
 
 def _chosen(forces: Any, state: Array, name: str, about: str) -> Chosen:
@@ -194,33 +201,46 @@ def _chosen(forces: Any, state: Array, name: str, about: str) -> Chosen:
     return forces_about_the_sun(forces, state) if about == "sun" else chosen_forces(forces, state, name=name)
 
 
-def _with_density(dates: Sequence[float], names: list[str], mean: Array, P: Array) -> tuple[Array, Array]:
-    """Means and their covariance with the air's density at the epoch in the coefficient of drag.
+def _estimated_air(names: Sequence[str], dates: Sequence[float], known: Mapping[str, Any]) -> list[str]:
+    """Names by which the density of the air was estimated at dates: its last node, and its waves; none where it was not."""
+    nodes, waves = [f"{DENSITY}{k}" for k in range(1, len(dates) + 1)], [wave for wave in WAVES if wave in names]
+    whole = nodes and {"cd_a_m", *nodes} <= set(names) & set(known) and set(waves) <= set(known)
+    return [nodes[-1], *waves] if whole else []
 
-    `dates` are those at which it was estimated, s past the epoch; empty where it was not.
+
+def _with_density(dates: Sequence[float], names: Sequence[str], mean: Array, P: Array) -> tuple[Array, Array]:
+    """Means and covariance with what density departs by in units of the coefficient of drag (m2/kg).
+
+    At the place of its last node is what it is at the epoch, from which on `dates` (s) are those of all nodes.
     """
-    nodes = [names.index(f"{DENSITY}{k}") for k in range(1, len(dates) + 1) if f"{DENSITY}{k}" in names]
-    if not nodes or len(nodes) != len(dates) or "cd_a_m" not in names:
-        return mean, P
-    weights = np.array([np.interp(0.0, dates, row) for row in np.eye(len(dates))])
-    drag, air = names.index("cd_a_m"), float(weights @ mean[nodes])
-    J, mean = np.eye(len(names)), mean.copy()
-    J[drag, drag], J[drag, nodes] = 1.0 + air, mean[drag] * weights
-    mean[drag] = max(mean[drag] * (1.0 + air), 0.0)
-    return mean, J @ P @ J.T
+    nodes = [names.index(f"{DENSITY}{k}") for k in range(1, len(dates) + 1)]
+    drag, own = names.index("cd_a_m"), [nodes[-1], *(names.index(wave) for wave in WAVES if wave in names)]
+    shares = np.eye(len(names))
+    shares[nodes[-1], nodes] = [np.interp(0.0, dates, row) for row in np.eye(len(dates))]
+    J, values = shares.copy(), mean.copy()
+    J[own] *= mean[drag]
+    J[own, drag] = shares[own] @ mean
+    values[own] = J[own, drag] * mean[drag]
+    return values, J @ P @ J.T
 
 
-def _departing(found: Course, chosen: Chosen, first: Array, usual: float, behind: float, known: bool) -> Course:
-    """The orbit with covariances that have in them how density departs.
+def _with_departure(chosen: Chosen, own: Sequence[str], time: float) -> Chosen:
+    """The forces with those beside the coefficient of drag: the first goes back to zero, over that time, away from t = 0."""
+    waves = (f"{wave}*{wave.replace(DENSITY, 'latitude_')}" for wave in own[1:])
+    total = " + ".join(("cd_a_m", f"{own[0]}*exp(-abs(t)/{MEMORY})", *waves))
+    text = {**LATITUDE, **instead(chosen.forces.definitions, "cd_a_m", f"max({total}, 0)")}
+    return replace(chosen, extra=Extra(text), values={**chosen.values, MEMORY: time})
 
-    Where it was estimated, `known`, it departs from that at the epoch; else `behind` the last measurement (s).  It does so by a
-    share of what it is with the `usual` coefficient of drag.
+
+def _departing(found: Course, chosen: Chosen, first: Array, sigma: float, behind: float, known: bool) -> Course:
+    """The orbit with covariances that have in them how density departs, with its steady `sigma` in the coefficient of drag.
+
+    Where it was estimated, `known`, it departs from that at the epoch; else `behind` the last measurement (s).
     """
     air, names, problem = chosen.air_varies, found.problem.model.names, found.problem
     if air is None or "cd_a_m" not in names:
         return found
-    place, sigma = names.index("cd_a_m"), air.sigma * usual
-    law = sigma, air.time, 0.0 if known else sigma
+    place, law = names.index("cd_a_m"), (sigma, air.time, 0.0 if known else sigma)
     there = first
     if behind > 0.0:
         there = carried_to(problem, chosen.max_step, 0.0, first, np.eye(len(first)), np.array([behind]))[0][0]
@@ -232,8 +252,8 @@ def _departing(found: Course, chosen: Chosen, first: Array, usual: float, behind
                 P[side] += departed(problem, chosen.max_step, behind, there, place, law, t[side])
         return x, P
 
-    held = ("the density of the air is held at what was estimated at the epoch, and departs from it",) if known else ()
-    return replace(found, beliefs=at, assumed=(*found.assumed, *held))
+    said = ("the density of the air goes from what was estimated at the epoch back to its model, and departs",) if known else ()
+    return replace(found, beliefs=at, assumed=(*found.assumed, *said))
 
 
 def _forces_of(said: Mapping[str, Any], source: str, about: str) -> Forces:
@@ -365,7 +385,7 @@ def _problem(
         warnings.simplefilter("ignore", EphemerisWarning)  # `assumed` says it
         functions = chosen.choice.functions(epoch)
     return Problem(
-        chosen.forces.model((), roles), Gaussian(state, P), parameters=values,
+        chosen.forces.model((), roles, None, chosen.extra.definitions), Gaussian(state, P), parameters=values,
         integrator=RungeKutta8(max_step=chosen.max_step), functions=functions, epoch=epoch,
         prior_time=0.0, name=name,
     )  # fmt: skip

@@ -3,7 +3,8 @@
 Density varies with the Sun and the geomagnetic field in ways that no model follows.  The share by which it departs is a
 first-order Gauss-Markov process.  Where drag moves an orbit by more than a tenth of what its measurements leave open, the
 process is estimated: its values at nodes that are equally far apart, from the first measurement or the orbit of before to the
-last, are made of independent numbers of unit variance, and between them it is linear.  Beside it stand sine and cosine of the
+last, are made of independent numbers of unit variance, and between them it is linear; there are as many as measurements tell
+apart.  Beside it stand sine and cosine of the
 argument of latitude, as models differ most in how much more air there is by day than by night.  So an orbit stays one arc,
 which the first state and constants determine.  Behind the last node its mean goes back to zero, and what it may have become
 meanwhile is added to covariances by the derivatives of the state by the coefficient of drag.
@@ -12,7 +13,7 @@ meanwhile is added to covariances by the derivatives of the state by the coeffic
 from __future__ import annotations
 
 from dataclasses import replace
-from math import exp, sqrt
+from math import exp, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ import numpy as np
 from piazzi.determination.analysis import analysed
 from piazzi.determination.motion import Extra, instead
 from piazzi.determination.orbit_forces import AirVaries, Chosen
-from piazzi.determination.physical import AIR, DENSITY, DRAG, SHARE, said_name, share_of, value_of
+from piazzi.determination.physical import AIR, DENSITY, DRAG, SHARE, said_name, share_of, slope_of, value_of
 from piazzi.determination.setup import Setup, follow, renewed
 from piazzi.determination.unknowns import Label
 from piazzi.earth import Epoch
@@ -29,7 +30,7 @@ from piazzi.estimate.estimator import Estimate
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 
-COUNT = 8  # nodes over the measurements, however long these are: another number would compile other kernels
+COUNTS = 8, 12, 16, 24  # nodes over the measurements: each number compiles kernels of its own
 SMALL = 0.1  # of a sigma, by which drag may move the solution before the density counts
 PARTS = 20.0  # of the process's time behind the measurements, in each of which it is constant
 WAVES = ("cos", "sin")
@@ -47,17 +48,31 @@ def with_density(given: Setup) -> Setup:
     if varies is None or DRAG not in names or not np.isfinite(given.states).all():
         return given
     first, last = _span(given)
-    moved = analysed(given, given.states).rows[..., names.index(DRAG)]
-    if not (last > first and np.linalg.norm(np.nan_to_num(moved)) > SMALL):
+    moved = np.nan_to_num(analysed(given, given.states).rows[..., names.index(DRAG)])
+    if not (last > first and np.linalg.norm(moved) > SMALL):
         return given
-    chosen = _with_process(
-        _about(given, varies, last - first), given.measured.epoch, varies, first, (last - first) / (COUNT - 1)
-    )
-    text = f"the density over the measurements is estimated at {COUNT} times, as drag moves the orbit"
+    share = float(given.states[0, names.index(DRAG)])
+    told = _told_apart(moved * float(value_of(share) / slope_of(share)), varies, last - first)
+    count = next((count for count in COUNTS if count >= told), COUNTS[-1])
+    chosen = _with_process(_about(given, varies, last - first), given.measured.epoch, varies, np.linspace(first, last, count))
+    text = f"the density over the measurements is estimated at {count} times, as drag moves the orbit"
+    if told > count:
+        text += f"; they tell {told:.0f} apart, so that sigmas are too small: determine shorter parts, each with --prior"
     found = renewed(given, given.measured, chosen)
     place = found.problem.model.names.index(DRAG)
     found.states[:, place] = share_of(_coefficient(given) / float(found.problem.parameters[said_name(DRAG)]))
     return replace(found, assumed=(*given.assumed, text))
+
+
+def _told_apart(moved: Array, varies: AirVaries, span: float) -> float:
+    """How many nodes the measurements can tell apart, by what twice the drag moves their rows by, in sigma.
+
+    Over a span T a Gauss-Markov process of sigma s and time tau is about a sum of cosines of k half waves, their amplitudes of
+    sigma s sqrt(4 T/tau) / (pi k).  A constant change of an acceleration moves an orbit along by 3/2 a T^2, such a wave by
+    3 a / (pi k/T)^2, which is 2 / (pi k)^2 of it.  Waves are left out that move all rows together by less than a sigma.
+    """
+    size = float(np.abs(moved).max()) * varies.sigma * sqrt(4.0 * span / varies.time) * 2.0 / pi**3
+    return float((size * sqrt(0.5 * np.count_nonzero(moved))) ** (1.0 / 3.0))
 
 
 def _coefficient(given: Setup) -> float:
@@ -95,37 +110,40 @@ def _span(given: Setup) -> tuple[float, float]:
     return begun, float(times[-1])
 
 
-def _with_process(chosen: Chosen, epoch: Epoch, varies: AirVaries, first: float, step: float) -> Chosen:
-    """The forces with it: all is text, and times and sigmas are parameters, so that others compile nothing."""
+def _with_process(chosen: Chosen, epoch: Epoch, varies: AirVaries, times: Array) -> Chosen:
+    """The forces with it at its nodes: all is text, and times and sigmas are parameters, so that others compile nothing."""
+    count, first = len(times), float(times[0])
+    step = (float(times[-1]) - first) / (count - 1)
     left = exp(-step / varies.time)
     numbers = {
         "first": first, "step": step, "rate": step / varies.time, "sigma": varies.sigma, "left": left,
         "new": varies.sigma * sqrt(1.0 - left**2),
     }  # fmt: skip
     nodes = {f"{AIR}at_1": f"{AIR}sigma*{AIR}1"}
-    nodes |= {f"{AIR}at_{k}": f"{AIR}left*{AIR}at_{k - 1} + {AIR}new*{AIR}{k}" for k in range(2, COUNT + 1)}
-    hats = [f"max(1 - abs({AIR}within - {k - 1}), 0)*{AIR}at_{k}" for k in range(1, COUNT + 1)]
+    nodes |= {f"{AIR}at_{k}": f"{AIR}left*{AIR}at_{k - 1} + {AIR}new*{AIR}{k}" for k in range(2, count + 1)}
+    hats = {f"{AIR}hat_{k}": f"max(1 - abs({AIR}within - {k - 1}), 0)*{AIR}at_{k}" for k in range(1, count + 1)}
     text = {
         **nodes,
         f"{AIR}place": f"(t - {AIR}first)/{AIR}step",
-        f"{AIR}within": f"max(min({AIR}place, {COUNT - 1}), 0)",
+        f"{AIR}within": f"max(min({AIR}place, {count - 1}), 0)",
+        **hats,
         **LATITUDE,
         f"{AIR}change": f"exp(-{AIR}rate*abs({AIR}place - {AIR}within))*({' + '.join(hats)})"
         + f" + {' + '.join(f'{DENSITY}{wave}*latitude_{wave}' for wave in WAVES)}",
     }
     every = {**chosen.forces.definitions, **chosen.extra.definitions}
     labels = {}
-    for k in range(1, COUNT + 1):
+    for k in range(1, count + 1):
         when = (epoch + (first + step * (k - 1))).to("UTC")[:16].replace("T", " ")
         labels[f"{AIR}{k}"] = Label(f"{DENSITY}{k}", f"share by which the density of the air departs at {when}")
     for wave in WAVES:
         words = f"share by which the density departs: its {NAMES[wave]} over a turn"
         labels[f"{DENSITY}{wave}"] = Label(f"{DENSITY}{wave}", words)
     extra = Extra({**text, **instead(every, DRAG, f"({DRAG} + {AIR}change)")}, labels=labels)
-    own = {f"{AIR}{k}": "estimated" for k in range(1, COUNT + 1)} | {f"{AIR}{name}": "fixed" for name in numbers}
+    own = {f"{AIR}{k}": "estimated" for k in range(1, count + 1)} | {f"{AIR}{name}": "fixed" for name in numbers}
     own |= {f"{DENSITY}{wave}": "estimated" for wave in WAVES}
     values: dict[str, Any] = {f"{DENSITY}{wave}": Gaussian(0.0, varies.sigma**2) for wave in WAVES}
-    values |= {f"{AIR}{k}": Gaussian(0.0, 1.0) for k in range(1, COUNT + 1)} | {f"{AIR}{n}": v for n, v in numbers.items()}
+    values |= {f"{AIR}{k}": Gaussian(0.0, 1.0) for k in range(1, count + 1)} | {f"{AIR}{n}": v for n, v in numbers.items()}
     return replace(chosen, roles={**chosen.roles, **own}, values={**chosen.values, **values}, extra=chosen.extra.and_(extra))
 
 
