@@ -91,11 +91,15 @@ def test_widths_have_units():
 
 def test_latex_has_every_cell_and_nothing_that_latex_reads(found):
     text = found.to_latex()
-    assert text.count(r"\begin{tabular}") == text.count(r"\end{tabular}") == 4  # state, elements, residuals, what was not used
-    state = text.split(r"\end{tabular}")[0]
-    rows = [line.split(" & ") for line in state.splitlines() if line.endswith(r"\\")][1:]
-    assert [row[0] for row in rows] == ["x", "y", "z", "vx", "vy", "vz", r"cr\_a\_m"]
-    for row in rows:
+    # state, elements, what is estimated beside them, residuals, what was not used
+    assert text.count(r"\begin{tabular}") == text.count(r"\end{tabular}") == 5
+    state, _, beside = (
+        [line.split(" & ") for line in table.splitlines() if line.endswith(r"\\")][1:]
+        for table in text.split(r"\end{tabular}")[:3]
+    )
+    assert [row[0] for row in state] == ["x", "y", "z", "vx", "vy", "vz"]
+    assert len(beside) == len(found.problem.model.names) - 6
+    for row in (*state, *beside):
         value, sigma = (cell.strip("$") for cell in row[1:3])
         assert len(value.partition(".")[2]) == len(sigma.partition(".")[2])  # rounded by the sigma
         assert len(sigma.replace(".", "").lstrip("0")) == 2
