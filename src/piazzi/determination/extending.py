@@ -72,7 +72,7 @@ def refined(
         low, high = more
         wider = (times >= low) & (times <= high)
         moved = _carried(problem, found, float(times[wider].min()), centre)
-        again = _different(_fits(problem, tracking, wider, moved, False), observer(problem, tracking, wider))
+        again = _different(_fits(problem, tracking, wider, moved), observer(problem, tracking, wider))
         if not again:
             beyond = _beyond(problem, times, keep, 0.0)
             break
@@ -141,14 +141,18 @@ def _carried(problem: Problem, found: Sequence[Refined], first: float, centre: C
     return out
 
 
-def _fits(problem: Problem, tracking: Tracking, keep: Array, starts: Sequence[Array], graph: bool = True) -> Iterator[Refined]:
-    """Fits to the rows to keep (J,), from states (n,) at the first of them; by a graph too where batch least squares fails."""
+def _fits(problem: Problem, tracking: Tracking, keep: Array, starts: Sequence[Array]) -> Iterator[Refined]:
+    """Fits to the rows to keep (J,), from states (n,) at the first of them.
+
+    By batch least squares alone: where it ends from none, the two-body fits that are its starts stand as they are.  The full
+    graph of the same rows and forces is many times the work, and six kernels more to compile.
+    """
     times = tracking.row_times[keep]
     few = part(tracking, keep)
     for start in starts:
         sigma = WIDE * np.repeat([np.linalg.norm(start[:3]), np.linalg.norm(start[3:6])], 3)
         posed = replace(problem, prior=Gaussian(start[:6], np.diag(sigma**2)), prior_time=float(times.min()))
-        solver = BatchLeastSquares(start=start, max_iterations=30, tolerance=NEAR, graph=graph)
+        solver = BatchLeastSquares(start=start, max_iterations=30, tolerance=NEAR, graph=False)
         try:
             estimate = solver.estimate(posed, few)
         except ValueError:
