@@ -103,6 +103,24 @@ def test_biases_of_passes_are_looked_for_and_found_only_where_there_are_some(giv
     assert with_common_errors(said) is said
 
 
+def test_a_station_of_larger_biases_is_known_by_them_and_one_with_a_fault_is_not(given):
+    t = given.tracking.row_times
+    of_pass = np.concatenate([[0], np.cumsum(np.diff(t) > 1000.0)])
+    mine = np.char.startswith(given.tracking.row_stations.astype(str), given.tracking.row_stations[2 * 5][:4])
+    usual = with_biases(given, 5, LASER)
+    for size, wide in ((0.1, True), (3.0, False)):
+        off = size * np.array([1.0, -1.0, 1.2, -0.8])[of_pass // 4]
+        z = usual.tracking.values + np.where(mine, off, 0.0)[:, None]
+        moved = replace(usual, tracking=pz.Tracking(t, z, given.tracking.row_stations, epoch=given.tracking.epoch))
+        found = with_pass_biases(approached(moved))
+        problem = found.problem
+        named = {found.labels[c].name.split("/")[0]: problem.parameters[c] for c in problem.model.constants}
+        sigma = {name: float(one.covariance[0, 0]) ** 0.5 for name, one in named.items()}
+        assert {name for name, one in sigma.items() if one > 1.01 * LASER} == ({"bias.range.7825"} if wide else set())
+        if wide:
+            assert 0.05 < sigma["bias.range.7825"] < 0.2 and "at 7825" in found.assumed[-1]
+
+
 @pytest.mark.slow
 def test_biases_of_passes_are_no_outliers_and_leave_honest_covariances(given):
     runs, total = 8, 0.0

@@ -11,19 +11,25 @@ from dataclasses import replace
 import numpy as np
 
 from piazzi.determination.analysis import Analysis, analysed
+from piazzi.determination.departures import LEAST
 from piazzi.determination.instruments import with_instruments
 from piazzi.determination.passes import pass_of_rows
-from piazzi.determination.setup import Setup, renewed
+from piazzi.determination.setup import Setup, renewed, scale_of
 from piazzi.determination.unknowns import PASS, Asked, Estimated
 from piazzi.estimate.chi_square import quantile
+from piazzi.evaluate.information import NEGLIGIBLE
+from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
 
 SURE = 0.999
 FEWEST = 3  # rows of a pass that say something together
+FAR = 5.0  # sigmas of a row from the median of its pass, beyond which it is an outlier
 MEDIAN = np.pi / 2  # times the variance of a mean of normal values is that of their median
 # m: short-term stability of 2 cm and long-term of 1 cm, which the ILRS asks of its stations (Pearlman et al. 2002, Adv. Space
 # Res. 30, 135, and its performance report cards)
 LASER = 0.022
+MOST = 10.0 * LASER  # m: of the sigma of a bias, not of a fault
+BISECTIONS = 40
 SOURCE = "the stability that the ILRS asks of its stations, 2 cm from pass to pass and 1 cm in the long term"
 
 
@@ -41,10 +47,77 @@ def with_common_errors(given: Setup) -> Setup:
 
 
 def with_pass_biases(given: Setup) -> Setup:
-    """The set-up with a bias of ranges for each pass; its prior and states are otherwise as they were."""
+    """The set-up with a bias of ranges for each pass; its prior and states are otherwise as they were.
+
+    Stations whose biases contradict the usual sigma have a wider one: not all of them are what the ILRS asks for.
+    """
     seen = with_instruments(given.measured, [Asked(Estimated("bias.range", PASS, LASER), "estimated", "--estimate")])
     text = f"a bias of each pass is estimated, before the measurements 0 +- {LASER:g} m ({SOURCE}), as residuals show some"
-    return replace(renewed(given, seen, given.chosen), assumed=(*given.assumed, text))
+    found = replace(renewed(given, seen, given.chosen), assumed=(*given.assumed, text))
+    wider = _wider(found)
+    if not wider:
+        return found
+    seen = found.measured
+    known = {name: wider[label] for label, names in _names(found).items() if label in wider for name in names}
+    parameters = {**seen.parameters, **{name: ("estimated", Gaussian(0.0, sigma**2)) for name, sigma in known.items()}}
+    told = ", ".join(f"{sigma:.2g} m at {label}" for label, sigma in wider.items())
+    found = renewed(found, replace(seen, parameters=parameters), found.chosen)
+    return replace(found, assumed=(*given.assumed, f"{text}; +- {told}, where they are larger than that allows"))
+
+
+def _names(given: Setup) -> dict[str, list[str]]:
+    """The biases of each station, by the label that people know it by."""
+    out: dict[str, list[str]] = {}
+    for name in given.measured.parameters:
+        label = next(given.measured.labels[s.name] for s in given.measured.stations if dict(s.numbers).get(f"is_{name}") == 1.0)
+        out.setdefault(label, []).append(name)
+    return out
+
+
+def _wider(given: Setup) -> dict[str, float]:
+    """Sigmas (m) of the biases of those stations that show larger ones than `LASER`, by labels.
+
+    Along the principal axes of what the measurements say of a station's biases they are independent, b of variance s: with a
+    prior of variance v, b^2 / (s + v) is one on average, which gives v.  Larger ones than `MOST` are faults, not biases.
+    """
+    analysis, scale = analysed(given, given.states), scale_of(given, given.states[0])
+    rows, names, stations = _near_their_pass(given, analysis), given.problem.model.names, _names(given)
+    root = analysis.information(rows, scale)
+    size = np.abs(np.diag(root))
+    if not size.min() > NEGLIGIBLE * size.max():
+        return {}
+    step, _ = analysis.toward(rows, root, scale)
+    half = np.linalg.solve(root.T, np.diag(scale)).T  # P = half half^T
+    out = {}
+    for label, own in stations.items():
+        at = [names.index(name) for name in own]
+        off = (given.states[0] + scale * step)[at] / LASER
+        share, axes = np.linalg.eigh(np.eye(len(at)) - (half[at] @ half[at].T) / LASER**2)
+        told = share > LEAST
+        squares, share = (axes.T @ off)[told] ** 2, share[told]
+        if not told.any() or np.sum(squares / share) <= quantile(1.0 - (1.0 - SURE) / len(stations), int(told.sum())):
+            continue
+        b, s = squares / share**2, 1.0 / share - 1.0
+        low, high = 1.0, (MOST / LASER) ** 2
+        if np.mean(b / (s + high)) > 1.0:
+            continue
+        for _ in range(BISECTIONS):
+            v = float(np.sqrt(low * high))
+            low, high = (v, high) if np.mean(b / (s + v)) > 1.0 else (low, v)
+        out[label] = LASER * float(np.sqrt(high))
+    return out
+
+
+def _near_their_pass(given: Setup, analysis: Analysis) -> Array:
+    """Rows (J,) that are not far from the others of their pass, of passes long enough to tell."""
+    passes = pass_of_rows(given.measured, given.tracking, given.rows)
+    near = np.zeros(len(passes), dtype=np.bool_)
+    for one in np.unique(passes[passes > 0]):
+        own = np.flatnonzero(passes == one)
+        known = analysis.whitened[own]
+        if np.isfinite(known).all(axis=1).sum() >= FEWEST:
+            near[own] = (np.abs(known - np.nanmedian(known, axis=0)) < FAR).all(axis=1)
+    return near
 
 
 def together(given: Setup, analysis: Analysis, rows: Array) -> tuple[float, int] | None:
