@@ -15,7 +15,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis, of_orbit
 from piazzi.determination.setup import Setup, follow, scale_of
-from piazzi.determination.sweep import products, swept
+from piazzi.determination.sweep import swept
 from piazzi.earth import Forces, Gravity
 from piazzi.earth.defaults import AIR_BELOW, DRAGGED, REFLECTED, lowest_height
 from piazzi.earth.force_text import Force
@@ -23,6 +23,7 @@ from piazzi.evaluate.information import singular, whitened
 from piazzi.expressions import evaluate_arrays
 from piazzi.model.definitions import needed
 from piazzi.model.values import with_arrays
+from piazzi.problem.arcs import products
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import prepare
 

@@ -41,6 +41,8 @@ def specs_of(estimator: Any, problem: Problem) -> list[KernelSpec]:
             return [smoother_spec(problem), *(again if estimator.iterations > 1 else [])]
         case SlidingWindow():
             return [window_spec(problem, estimator.loss)]
+        case FactorGraph() if not isinstance(estimator.start, str) and problem.functions and problem.is_noise_free:
+            return []  # it may follow one orbit
         case FactorGraph():
             first = [filter_spec(problem)] if isinstance(estimator.start, str) and estimator.start == "ekf" else []
             model = problem.model

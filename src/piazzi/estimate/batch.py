@@ -2,93 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from piazzi import kernels
-from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain
 from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.estimator import Estimate, Stopwatch, View
 from piazzi.estimate.factor_graph import FactorGraph
 from piazzi.estimate.gauss_newton import Outcome, optimize
 from piazzi.estimate.gradients import ended_exactly
+from piazzi.estimate.shooting import OrbitChain, ShootingSolver, steps_taken
 from piazzi.estimate.width import undetermined
-from piazzi.kernels.spec import FILLS_REGISTERS
 from piazzi.problem import Problem, Tracking
-from piazzi.problem.arcs import Arc, arc
 from piazzi.problem.checks import Array, numeric
-from piazzi.problem.inputs import Inputs, prepare, with_prior_node
+from piazzi.problem.inputs import prepare, with_prior_node
 
 MAX_FROM_PRIOR = 15  # iterations from the prior before the graph is asked; where it converges at all, half of them suffice
-
-
-class OrbitChain(Chain):
-    """A chain whose states are one orbit, linearised while it is followed: by a multi-step method, or interval by interval.
-
-    For methods whose states cannot be linearised several at a time.
-    """
-
-    dynamics = "linearize_given"
-
-    def __init__(self, problem: Problem, inputs: Inputs) -> None:
-        super().__init__(problem, inputs)
-        self.steps = problem.steps(float(inputs.t[0]), float(inputs.t[-1]))
-        self._arc: Arc | None = None
-
-    def orbit(self, first: Array) -> Array:
-        """States at all nodes (K, n) of the orbit from `first`."""
-        if self._arc is None or not np.array_equal(self._arc.x[0], first):
-            self._arc = arc(self.problem, self.inputs.t, first, self.steps, derivative=True)
-        return self._arc.x
-
-    def linearize(self) -> float:
-        self.x[:] = self.orbit(self.x[0])
-        assert self._arc is not None
-        self.f[:-1], self.Phi[:-1] = self.x[1:], self._arc.Phi
-        return super().linearize()
-
-    @staticmethod
-    def applies(problem: Problem, inputs: Inputs) -> bool:
-        """Whether it is the faster way."""
-        assert problem.integrator is not None
-        if not problem.moves_in_lanes or problem.model.n > FILLS_REGISTERS:
-            return True  # with lanes or without them: the way, and so the rounding, is a matter of the problem alone
-        return bool(problem.integrator.arc_scheme) and problem.steps(float(inputs.t[0]), float(inputs.t[-1])).grid is not None
-
-
-class ShootingSolver(BorderedSolver):
-    """The bordered solver for orbits that hold the dynamics throughout: only their first state and the constants move."""
-
-    name = "batch"
-
-    def __init__(self, chain: Chain) -> None:
-        super().__init__(chain)
-        if isinstance(chain, OrbitChain):
-            return
-        i = chain.inputs
-        self.x: Array = np.empty_like(chain.x)
-        library = kernels.load(chain.problem.spec("transition", "propagate"))
-        self._propagate: Callable[[], None] = library.run_propagation.bind(
-            i.epochs, i.t, i.count, chain.problem.given_bundle, self.x
-        )
-
-    def begin(self, states: Array) -> Array:
-        return self._orbit(states[0])
-
-    def moved(self, states: Array, step: Array) -> Array:
-        return self._orbit(states[0] + step[0])
-
-    def _orbit(self, first: Array) -> Array:
-        """States at all nodes (K, n) of the orbit from `first`."""
-        if isinstance(self.chain, OrbitChain):
-            return self.chain.orbit(first).copy()
-        self.x[0] = first
-        self._propagate()
-        return self.x.copy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +89,7 @@ class BatchLeastSquares:
             None,
             outcome.details
             | {"start": used, "first_state": chain.x[0].copy(), "residuals": chain.residuals()}
-            | _steps(noise_free, nodes),
+            | steps_taken(chain),
             outcome.failure or undetermined(noise_free, outcome.covariance[0], chain.x),
         )
 
@@ -189,11 +120,7 @@ class BatchLeastSquares:
 
 def undisturbed(problem: Problem) -> Problem:
     """The problem with exact dynamics: no process noise, and manoeuvres as commanded."""
+    if problem.is_noise_free:
+        return problem  # another one would be checked anew
     noise = replace(problem.process_noise, covariance=np.zeros_like(problem.process_noise.covariance))
     return replace(problem, process_noise=noise, manoeuvres=[replace(m, covariance=None) for m in problem.manoeuvres])
-
-
-def _steps(problem: Problem, nodes: Inputs) -> dict[str, float]:
-    """The step of a multi-step method's grid in seconds, where there is one."""
-    grid = problem.steps(float(nodes.t[0]), float(nodes.t[-1])).grid
-    return {} if grid is None else {"grid_step": grid}

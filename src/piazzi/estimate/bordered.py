@@ -127,6 +127,9 @@ class BorderedSolver:
         if self.C:
             self.unknowns.B[:], self.unknowns.G[:] = c.Phi[:, :nd, nd:].transpose(0, 2, 1), c.H[:, :, nd:]
 
+    def disturb(self, bits: Array) -> None:
+        self.chain.f[:-1] += bits[1:]
+
     def of_constants(self) -> Array:
         root = self.sigma[:, None] * self.unknowns.inverse[self.nd :, self.nd :]
         return np.asarray(root @ root.T)

@@ -215,6 +215,9 @@ class Solver(Protocol):
     def solve(self, damping: float) -> None:
         """Leave the Gauss-Newton (or damped) step in the chain's `dx`."""
 
+    def disturb(self, bits: Array) -> None:
+        """Let the dynamics round the states (K, n) by so much, for the next solve."""
+
     def of_constants(self) -> Array:
         """Covariance of the constants (C, C), after an undamped solve."""
 
@@ -254,6 +257,9 @@ class CovarianceSolver:
             self.kernels.graph_solve(*self._solve, float(damping))
         else:
             self._undamped()
+
+    def disturb(self, bits: Array) -> None:
+        self.chain.f[:-1] += bits[1:]
 
     def of_constants(self) -> Array:
         c = slice(len(self.chain.problem.model.moving), None)

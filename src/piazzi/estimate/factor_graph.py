@@ -14,12 +14,13 @@ from piazzi.estimate.bordered import BorderedSolver
 from piazzi.estimate.chain import Chain, CovarianceSolver, Solver
 from piazzi.estimate.considered import nominal, with_considered
 from piazzi.estimate.estimator import Estimate, Stopwatch, View
-from piazzi.estimate.gauss_newton import Outcome
+from piazzi.estimate.gauss_newton import Outcome, optimize
 from piazzi.estimate.gradients import ended_exactly
 from piazzi.estimate.joint_mode import applies, bias_message, marginal
 from piazzi.estimate.kalman import filter_run
 from piazzi.estimate.losses import Cauchy, loss_of
 from piazzi.estimate.robust import RobustChain, chain_for, gated_run, minimize, solve_at
+from piazzi.estimate.shooting import OrbitChain, ShootingSolver, dense_steps, steps_taken
 from piazzi.estimate.sliding_window import SlidingWindow
 from piazzi.estimate.width import DIFFUSE, NOT_BORDERED, ROUNDED, TOO_WIDE, undetermined
 from piazzi.problem import Problem, Tracking
@@ -31,6 +32,8 @@ CONSTANTS = ("joint", "marginal")
 SOLVERS = ("auto", "chain", "bordered")
 # iterations that a second solution may take before the first is kept
 MAX_SECOND = 20
+AS_ONE = 1e-4  # sigma, to which an orbit is found: over days rounding moves it by more than a smaller step
+ONE_ORBIT = 1e-4  # of the largest value: given states nearer than that to the orbit of the first are meant to be one
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,9 @@ class FactorGraph:
     says how far it may be off.  Process noise that depends on the states is that of the newest states, held fixed within an
     iteration: what is found is a fixed point of that.  With singular noise "cost" uses the
     pseudo-inverse of Q and stands beside "defect", the largest violation of the dynamics in prior standard deviations.
+
+    Given states that are one orbit of a problem without process noise are moved by the first alone, to 1e-4 sigma, where
+    epochs are denser than the steps that its forces ask for: ``details["solver"]`` is "batch", and `BatchLeastSquares` does it.
 
     With a loss the cost is the robust one, found by iterated reweighting; the start is a filter with a gate, and where the
     solution then rejects many measurements, a window with a loss and the prior are tried too.  Tukey's and Cauchy's losses are
@@ -121,14 +127,14 @@ class FactorGraph:
         nodes = with_prior_node(inputs)
         skip = nodes.epochs - inputs.epochs
         watch = Stopwatch()
-        chain = chain_for(problem, nodes, self.loss)
-        outcome, solver, used = self._optimize(chain, inputs, tracking)
+        chain, solver, outcome, used = self._along_orbit(problem, nodes, tracking) or self._of_states(problem, nodes, tracking)
         if self._bank is not None:
             outcome = search(self._bank, chain, solver, inputs, outcome, self.tolerance)
         if not outcome.failure and applies(chain):
             outcome = self._with_constants(chain, solver, outcome)
         nu, S = chain.innovations()
         details = {"start": used} | outcome.details | {"first_state": chain.x[0].copy(), "residuals": chain.residuals()}
+        details |= steps_taken(chain)
         if isinstance(chain, RobustChain):
             details |= {"loss": str(self.loss), "weights": chain.weights}
         failure = outcome.failure or undetermined(problem, outcome.covariance[0], chain.x)
@@ -148,6 +154,28 @@ class FactorGraph:
             details,
             failure,
         )
+
+    def _of_states(self, problem: Problem, nodes: Inputs, tracking: Tracking) -> tuple[Chain, Solver, Outcome, str]:
+        """Every state by itself: the chain, its solver, how that ended, and the starts used."""
+        chain = chain_for(problem, nodes, self.loss)
+        outcome, solver, used = self._optimize(chain, prepare(problem, tracking), tracking)
+        return chain, solver, outcome, used
+
+    def _along_orbit(self, problem: Problem, nodes: Inputs, tracking: Tracking) -> tuple[Chain, Solver, Outcome, str] | None:
+        """The same of given states that are one orbit, where nothing but its first state and the constants is unknown.
+
+        None where epochs are not dense enough for that to be faster, and where it does not end as it should.
+        """
+        named = isinstance(self.start, (str, Bank, Paths)) or self.solver != "auto" or self.loss is not None
+        if named or not problem.is_noise_free or not dense_steps(problem, nodes):
+            return None
+        chain = OrbitChain(problem, nodes)
+        states, solver = with_first(chain, self._given(problem, tracking)), ShootingSolver(chain)
+        away = np.abs(chain.orbit(states[0]) - states).max(axis=0)
+        if not (away <= ONE_ORBIT * np.abs(states).max(axis=0)).all():
+            return None
+        outcome = optimize(chain, solver, states, self.max_iterations, max(self.tolerance, AS_ONE))
+        return None if outcome.failure or "remark" in outcome.details else (chain, solver, outcome, "given")
 
     def _with_constants(self, chain: Chain, solver: Solver, outcome: Outcome) -> Outcome:
         """The outcome with its constants at the marginal mode, where that is asked for; else what is to be said about them."""
@@ -234,14 +262,18 @@ class FactorGraph:
         solve_at(chain, solver, x)
         return outcome, False
 
+    def _given(self, problem: Problem, tracking: Tracking) -> Array:
+        """States (K, n) to start from, as they were given."""
+        K, n = len(tracking.times), problem.model.n
+        states = numeric(self.start.states[0] if isinstance(self.start, Paths) else self.start, "start")
+        if states.shape != (K, n) or not np.isfinite(states).all():
+            raise ValueError(f"start has shape {states.shape}; it must be ({K}, {n}), and finite")
+        return states
+
     def _begin(self, start: str, problem: Problem, tracking: Tracking, inputs: Inputs) -> tuple[Array, bool]:
         """States to start from, (K, n), and whether the filter that they come from was wrong about its errors."""
-        K, n = len(tracking.times), problem.model.n
         if start == "given":
-            states = numeric(self.start.states[0] if isinstance(self.start, Paths) else self.start, "start")
-            if states.shape != (K, n) or not np.isfinite(states).all():
-                raise ValueError(f"start has shape {states.shape}; it must be ({K}, {n}), and finite")
-            return states, False
+            return self._given(problem, tracking), False
         if start == "window":
             first = nominal(SlidingWindow(loss=None if self.loss is None else Cauchy()), problem, tracking)
             assert first.delayed is not None

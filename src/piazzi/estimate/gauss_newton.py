@@ -90,7 +90,7 @@ def _ended(chain: Chain, solver: Solver, ahead: Array | None, tolerance: float) 
     last = chain.dx if ahead is None else ahead
     if max(chain.report[STEP_SMOOTHED], 0.0 if ahead is None else chain.largest(ahead, covariance)) > tolerance:
         return None
-    chain.x[:] = solver.moved(chain.x, last)
+    chain.x += last  # of one orbit too: so small a step is linear
     chain.d_pred -= last  # predictions are about the states as they now are
     return covariance
 
@@ -133,7 +133,7 @@ def _rounding(chain: Chain, solver: Solver) -> float:
     """
     f, nu, step = chain.f.copy(), chain.nu.copy(), chain.dx.copy()
     bits = _last_bits(chain)
-    chain.f[:-1] += bits[1:]
+    solver.disturb(bits)
     chain.nu += chain.by_measurement(bits) + chain.measured_bits * np.random.default_rng(1).uniform(-1.0, 1.0, chain.nu.shape)
     solver.solve(0.0)
     chain.f[:], chain.nu[:] = f, nu

@@ -12,6 +12,7 @@ import numpy as np
 from piazzi.estimate.forecast import STEP, checked_times, forecast, moved
 from piazzi.estimate.soundness import defect
 from piazzi.problem import Problem
+from piazzi.problem.arcs import products
 from piazzi.problem.checks import Array, Locked, numeric
 from piazzi.text import brief
 
@@ -145,14 +146,5 @@ def _arc(problem: Problem, begin: float, at: Array, first: Array) -> tuple[Array
     """States (K, n), and their derivatives by the first (K, n, n)."""
     nodes, where = np.unique(np.append(begin, at), return_inverse=True)
     arc = problem.arc(nodes, first)
-    whole = _products(np.concatenate([np.eye(len(first))[None], arc.Phi]))
+    whole = products(arc.Phi)
     return arc.x[where[1:]], whole[where[1:]]
-
-
-def _products(factors: Array) -> Array:
-    """The product of each matrix (K, n, n) with all before it, the newest at the left: doubling how many are joined."""
-    out, many = factors.copy(), 1
-    while many < len(out):
-        out[many:] = out[many:] @ out[:-many]
-        many *= 2
-    return out
