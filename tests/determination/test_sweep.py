@@ -8,7 +8,7 @@ from piazzi.determination import sweep
 from piazzi.determination.determining import prepared
 from piazzi.determination.guesses import Guess
 from piazzi.determination.setup import follow
-from piazzi.problem.arcs import dense_grid, on_dense_grid, products
+from piazzi.problem.dense import dense_grid, on_dense_grid, products
 from tests.determination.fixing import EPOCH, STATE, observations
 
 

@@ -23,8 +23,8 @@ from piazzi.evaluate.information import singular, whitened
 from piazzi.expressions import evaluate_arrays
 from piazzi.model.definitions import needed
 from piazzi.model.values import with_arrays
-from piazzi.problem.arcs import products
 from piazzi.problem.checks import Array
+from piazzi.problem.dense import products
 from piazzi.problem.inputs import prepare
 
 LARGEST = 120  # degree of the fields of the package

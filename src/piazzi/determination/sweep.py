@@ -10,8 +10,8 @@ import numpy as np
 
 from piazzi.determination.setup import follow
 from piazzi.problem import Problem
-from piazzi.problem.arcs import dense_grid, on_dense_grid, products
 from piazzi.problem.checks import Array
+from piazzi.problem.dense import dense_grid, on_dense_grid, products
 
 
 def swept(problem: Problem, times: Array, first: Array, step: float) -> tuple[Array, Array]:

@@ -12,8 +12,8 @@ import numpy as np
 from piazzi.estimate.forecast import STEP, checked_times, forecast, moved
 from piazzi.estimate.soundness import defect
 from piazzi.problem import Problem
-from piazzi.problem.arcs import products
 from piazzi.problem.checks import Array, Locked, numeric
+from piazzi.problem.dense import products
 from piazzi.text import brief
 
 if TYPE_CHECKING:

@@ -15,8 +15,9 @@ from piazzi.kernels import Discrete, KernelSpec
 from piazzi.kernels.spec import FILLS_REGISTERS
 from piazzi.model import Model, Sensor
 from piazzi.problem import Problem
-from piazzi.problem.arcs import arc, dense_grid, on_dense_grid, products
+from piazzi.problem.arcs import arc
 from piazzi.problem.checks import Array
+from piazzi.problem.dense import dense_grid, on_dense_grid, products
 from piazzi.problem.inputs import Inputs
 
 

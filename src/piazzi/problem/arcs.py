@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from math import ceil, isqrt
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from piazzi import kernels
 from piazzi.kernels import Integrator, KernelSpec
 from piazzi.kernels.bundle import Given
-from piazzi.kernels.multistep import second_order
 from piazzi.kernels.spec import outside_fragments
 from piazzi.model import Model
 from piazzi.problem.checks import Array
 from piazzi.problem.evaluation import cut_at_events
 from piazzi.problem.manoeuvres import SAME
 
-if TYPE_CHECKING:
-    from piazzi.problem.problem import Problem
-
 FEWEST = 30  # steps between two beginnings of a multi-step method: with fewer, its beginning costs what it saves
-FINER, RESOLVED = 1.5, 20  # steps of the multi-step method for one of order 8; more for fields beyond a degree of 30
-STAGES = 12  # evaluations of a step of order 8
-WORTH = 3  # times the evaluations of a grid, from which on it is the faster way by far
-BEGINNING = 10  # steps of order 8 that a grid begins with
 
 
 class Moving(Protocol):
@@ -82,55 +73,6 @@ def arc(problem: Moving, times: Array, first: Array, steps: Steps, derivative: b
         if on_epoch:
             way.out.x[stop - 1] = way.now
     return way.out
-
-
-def dense_grid(problem: Problem, times: Array, step: float) -> int:
-    """Steps of a grid instead of steps of order 8 of so many seconds, and one at least to each epoch; 0 where these are better.
-
-    For forces that are dear and without jumps, so that nothing interrupts the multi-step method.
-    """
-    smooth = not (problem.manoeuvres or problem.model.events or "burning" in problem.functions)
-    if not (smooth and problem.functions and problem.is_noise_free and second_order(problem.model)):
-        return 0
-    degree = max((getattr(f, "degree", None) or 0 for f in problem.functions.values()), default=0)
-    count = int(np.ceil(max(FINER, degree / RESOLVED) * (times[-1] - times[0]) / step))
-    alone = STAGES * np.ceil(np.diff(times) / step).sum()
-    return count if count >= FEWEST and alone >= WORTH * (count + STAGES * BEGINNING) else 0
-
-
-def on_dense_grid(problem: Problem, times: Array, first: Array, count: int) -> tuple[Array, Array]:
-    """States (K, n) at increasing times, and their derivatives (K, n, n) by the first of them, in so many equal steps.
-
-    Between the steps' ends they lie on the polynomial through the rates, whose order is the method's.
-    """
-    problem.cover(float(times[0]), float(times[-1]))
-    K, n = len(times), len(first)
-    x, W, last = np.empty((K, n)), np.empty((K, n, n)), np.empty((n, n))
-    x[0], W[0] = first, np.eye(n)
-    scheme = kernels.GaussJackson(max_step=1.0).arc_scheme
-    fragments = ("matrices", "arc_unwatched", "gauss_jackson_rows", "gauss_jackson_whole", "gauss_jackson")
-    library = kernels.load(_spec(problem, scheme, fragments))
-    done = np.array([count, K - 1, times[-1]])
-    library.run_multistep(K, np.ascontiguousarray(times), count, problem.given_bundle, x, W, done, last)
-    return x, W
-
-
-def products(Phi: Array) -> Array:
-    """Derivatives (K, n, n) by the first state, of transition matrices (K - 1, n, n): the first is a unit matrix.
-
-    In blocks of about the root of their number, all blocks at once, then from block to block.
-    """
-    many, n = len(Phi), Phi.shape[-1]
-    size = max(isqrt(many), 1)
-    blocks = ceil(many / size)
-    out = np.tile(np.eye(n), (blocks * size + 1, 1, 1))
-    out[1 : many + 1] = Phi
-    own = out[1:].reshape(blocks, size, n, n)
-    for k in range(1, size):
-        own[:, k] = own[:, k] @ own[:, k - 1]
-    for b in range(1, blocks):
-        own[b] = own[b] @ own[b - 1, -1]
-    return out[: many + 1]
 
 
 class _Way:
@@ -207,7 +149,7 @@ def _on_grid(problem: Moving, at: Array, first: Array, count: int, derivative: b
     watched = ("events", "arc_watched") if problem.model.events else ("arc_unwatched",)
     carried = ("gauss_jackson_rows", "gauss_jackson_intervals") if derivative else ("gauss_jackson_state",)
     fragments = ("matrices", *watched, *carried, "gauss_jackson")
-    library = kernels.load(_spec(problem, problem.integrator.arc_scheme, fragments))
+    library = kernels.load(spec_of(problem, problem.integrator.arc_scheme, fragments))
     done = np.array([count, K - 1, at[-1]])
     library.run_multistep(K, at, count, problem.given_bundle, out.x, out.Phi, done, last_Phi)
     inside = int(done[1])
@@ -243,14 +185,14 @@ def _by_intervals(problem: Moving, times: Array, out: Arc, steps: Steps, events:
         library = kernels.load(problem.spec("transition", name))
     else:
         motion = cut_at_events(problem.model, integrator.fragments)
-        library = kernels.load(_spec(problem, integrator.scheme, ("matrices", *motion, "transition", name)))
+        library = kernels.load(spec_of(problem, integrator.scheme, ("matrices", *motion, "transition", name)))
     if name == "transitions":
         library.run_transitions(len(times), times, count, given, out.x, out.Phi)
     else:
         library.run_propagation(len(times), times, count, given, out.x)
 
 
-def _spec(problem: Moving, scheme: tuple[object, ...], fragments: tuple[str, ...]) -> KernelSpec:
+def spec_of(problem: Moving, scheme: tuple[object, ...], fragments: tuple[str, ...]) -> KernelSpec:
     """The compiled module of this model with these fragments as they are, whatever the problem's events."""
     key = (*fragments, *map(str, scheme[:1])), -1
     spec = problem.specs.get(key)
