@@ -1,6 +1,7 @@
 """`piazzi propagate`: files of orbits and scenarios, what is written, and bad input in one line."""
 
 import csv
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -166,3 +167,15 @@ def test_orbits_that_are_none_are_refused(call, tmp_path):
     assert "No such file" in call("propagate", tmp_path / "none.oem").refused()
     assert "--forces is for files" in call("propagate", "b612-range-q0", "--forces", "none").refused()
     assert "an OEM holds orbits" in call("propagate", "b612-range-q0", "-o", tmp_path / "b.oem").refused()
+
+
+def test_mean_elements_as_json_are_no_determination(call, tmp_path):
+    mean = {
+        "OBJECT_NAME": "A", "OBJECT_ID": "2020-003C", "EPOCH": "2020-12-29T03:57:59.406624", "MEAN_MOTION": 15.27989249,
+        "ECCENTRICITY": 0.0013356, "INCLINATION": 97.297, "RA_OF_ASC_NODE": 66.4161, "ARG_OF_PERICENTER": 110.6345,
+        "MEAN_ANOMALY": 334.7107, "NORAD_CAT_ID": 45018, "BSTAR": 8.4553e-05,
+        "MEAN_MOTION_DOT": 2.241e-05, "MEAN_MOTION_DDOT": 0,
+    }  # fmt: skip
+    path = tmp_path / "omm.json"
+    path.write_text(json.dumps(mean))
+    assert call("propagate", path, "--to", "10min", "--step", "5min", "--json").document["assumed"] is not None

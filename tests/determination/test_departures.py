@@ -85,3 +85,11 @@ def test_what_is_considered_makes_the_test_cautious_and_what_is_wrong_already_st
     assert (kept.ok, kept.figure, kept.sentence) == (False, 3.0, bad.sentence) and "before" in kept.test
     failed = SimpleNamespace(**{**vars(answer(problem, rng)), "success": False})
     assert believable(given(problem[1]), failed, GOOD) is GOOD
+
+
+def test_products_of_a_contradicted_prior_are_never_taken_as_honest(problem):
+    """One value far off among many honest ones is a factor above one, too."""
+    extra = np.zeros(BIASES)
+    extra[2] = 6.0 * SPREAD
+    found = departures(given(problem[1]), answer(problem, np.random.default_rng(4), extra=extra))
+    assert found.contradict and found.excess > 1.0

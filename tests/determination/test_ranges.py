@@ -12,6 +12,9 @@ from piazzi.determination.approach import approached
 from piazzi.determination.common import LASER, with_common_errors, with_pass_biases
 from piazzi.determination.determining import prepared, solved
 from piazzi.determination.fit import estimators
+from piazzi.determination.instruments import with_instruments
+from piazzi.determination.setup import renewed
+from piazzi.determination.unknowns import asked
 from piazzi.estimate.chi_square import quantile
 from piazzi.evaluate.information import predicted
 from piazzi.formats import Correction, Observations, Segment
@@ -119,6 +122,19 @@ def test_a_station_of_larger_biases_is_known_by_them_and_one_with_a_fault_is_not
         assert {name for name, one in sigma.items() if one > 1.01 * LASER} == ({"bias.range.7825"} if wide else set())
         if wide:
             assert 0.05 < sigma["bias.range.7825"] < 0.2 and "at 7825" in found.assumed[-1]
+
+
+@pytest.mark.parametrize("role", ["estimated", "considered"])
+def test_biases_of_passes_stand_beside_other_constants_of_the_instruments(given, role):
+    """Of which a considered one is no value of the model, and an estimated one is not in metres."""
+    before = approached(with_biases(given, 5, 0.1))
+    words = "scale.range.7090=1e-6"
+    seen = with_instruments(before.measured, asked(words, None) if role == "estimated" else asked(None, words))
+    found = with_pass_biases(renewed(before, seen, before.chosen))
+    (scale,) = (name for name in found.measured.parameters if name.startswith("range_scale"))
+    known, prior = found.measured.parameters[scale]
+    assert known == role and prior.covariance[0, 0] == pytest.approx(1e-12)
+    assert "m at 7" in found.assumed[-1]
 
 
 @pytest.mark.slow

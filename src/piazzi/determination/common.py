@@ -6,6 +6,7 @@ as many that do not, and where nothing stands for it good passes look like outli
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from piazzi.determination.analysis import Analysis, analysed
 from piazzi.determination.departures import LEAST
 from piazzi.determination.instruments import with_instruments
 from piazzi.determination.passes import pass_of_rows
+from piazzi.determination.sensing import Measured
 from piazzi.determination.setup import Setup, renewed, scale_of
 from piazzi.determination.unknowns import PASS, Asked, Estimated
 from piazzi.estimate.chi_square import quantile
@@ -54,34 +56,34 @@ def with_pass_biases(given: Setup) -> Setup:
     seen = with_instruments(given.measured, [Asked(Estimated("bias.range", PASS, LASER), "estimated", "--estimate")])
     text = f"a bias of each pass is estimated, before the measurements 0 +- {LASER:g} m ({SOURCE}), as residuals show some"
     found = replace(renewed(given, seen, given.chosen), assumed=(*given.assumed, text))
-    wider = _wider(found)
+    biases = _of_stations(seen, [name for name in seen.parameters if name not in given.measured.parameters])
+    wider = _wider(found, biases)
     if not wider:
         return found
-    seen = found.measured
-    known = {name: wider[label] for label, names in _names(found).items() if label in wider for name in names}
+    known = {name: wider[label] for label, names in biases.items() if label in wider for name in names}
     parameters = {**seen.parameters, **{name: ("estimated", Gaussian(0.0, sigma**2)) for name, sigma in known.items()}}
     told = ", ".join(f"{sigma:.2g} m at {label}" for label, sigma in wider.items())
     found = renewed(found, replace(seen, parameters=parameters), found.chosen)
     return replace(found, assumed=(*given.assumed, f"{text}; +- {told}, where they are larger than that allows"))
 
 
-def _names(given: Setup) -> dict[str, list[str]]:
+def _of_stations(seen: Measured, names: Sequence[str]) -> dict[str, list[str]]:
     """The biases of each station, by the label that people know it by."""
     out: dict[str, list[str]] = {}
-    for name in given.measured.parameters:
-        label = next(given.measured.labels[s.name] for s in given.measured.stations if dict(s.numbers).get(f"is_{name}") == 1.0)
+    for name in names:
+        label = next(seen.labels[s.name] for s in seen.stations if dict(s.numbers).get(f"is_{name}") == 1.0)
         out.setdefault(label, []).append(name)
     return out
 
 
-def _wider(given: Setup) -> dict[str, float]:
+def _wider(given: Setup, stations: Mapping[str, Sequence[str]]) -> dict[str, float]:
     """Sigmas (m) of the biases of those stations that show larger ones than `LASER`, by labels.
 
     Along the principal axes of what the measurements say of a station's biases they are independent, b of variance s: with a
     prior of variance v, b^2 / (s + v) is one on average, which gives v.  Larger ones than `MOST` are faults, not biases.
     """
     analysis, scale = analysed(given, given.states), scale_of(given, given.states[0])
-    rows, names, stations = _near_their_pass(given, analysis), given.problem.model.names, _names(given)
+    rows, names = _near_their_pass(given, analysis), given.problem.model.names
     root = analysis.information(rows, scale)
     size = np.abs(np.diag(root))
     if not size.min() > NEGLIGIBLE * size.max():
@@ -115,8 +117,9 @@ def _near_their_pass(given: Setup, analysis: Analysis) -> Array:
     for one in np.unique(passes[passes > 0]):
         own = np.flatnonzero(passes == one)
         known = analysis.whitened[own]
-        if np.isfinite(known).all(axis=1).sum() >= FEWEST:
-            near[own] = (np.abs(known - np.nanmedian(known, axis=0)) < FAR).all(axis=1)
+        known = known[:, np.isfinite(known).sum(axis=0) >= FEWEST]
+        if known.size:
+            near[own] = (np.abs(known - np.nanmedian(known, axis=0)) < FAR).any(axis=1)
     return near
 
 

@@ -27,6 +27,7 @@ from piazzi.earth.force_text import LATITUDE
 from piazzi.earth.rotation import frame_named
 from piazzi.formats import read_ephemeris
 from piazzi.formats.ephemeris import MeanElements
+from piazzi.formats.recognise import recognise
 from piazzi.kernels import RungeKutta8
 from piazzi.opening import opened as opened_file
 from piazzi.orbit import sgp4_states
@@ -135,6 +136,8 @@ def determination_in(path: str) -> Mapping[str, Any] | None:
     with opened_file(path) as file:
         start = file.read(512)
         if start.lstrip().startswith(JSON):
+            if recognise(start) is not None:
+                return None
             return _parsed(start + file.read(2**24), path)
     if not start.startswith(HDF5):
         return None

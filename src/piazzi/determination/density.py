@@ -57,7 +57,10 @@ def with_density(given: Setup) -> Setup:
     chosen = _with_process(_about(given, varies, last - first), given.measured.epoch, varies, np.linspace(first, last, count))
     text = f"the density over the measurements is estimated at {count} times, as drag moves the orbit"
     if told > count:
-        text += f"; they tell {told:.0f} apart, so that sigmas are too small: determine shorter parts, each with --prior"
+        text += (
+            f"; the measurements tell {told:.0f} such values apart, so that sigmas are too small: "
+            "determine shorter parts, each with --prior"
+        )
     found = renewed(given, given.measured, chosen)
     place = found.problem.model.names.index(DRAG)
     found.states[:, place] = share_of(_coefficient(given) / float(found.problem.parameters[said_name(DRAG)]))

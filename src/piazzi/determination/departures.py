@@ -44,7 +44,7 @@ class Departures:
     def far(self) -> list[int]:
         """Those that are too far by themselves, as many as there are, the farthest first."""
         sizes = np.nan_to_num(np.abs(self.sigmas))
-        own = sizes**2 > quantile(1.0 - (1.0 - SURE) / 2.0 / max(int(np.isfinite(self.sigmas).sum()), 1), 1)
+        own = sizes**2 > _most(int(np.isfinite(self.sigmas).sum()))
         return [int(i) for i in np.argsort(-sizes, kind="stable") if own[i]]
 
     @property
@@ -58,6 +58,13 @@ class Departures:
         return float(np.sqrt(self.squares / max(self.freedom, 1)))
 
     @property
+    def excess(self) -> float:
+        """How many times as large as expected they are together, or the farthest as honest ones may be."""
+        known = int(np.isfinite(self.sigmas).sum())
+        alone = float(np.nanmax(np.abs(self.sigmas))) / float(np.sqrt(_most(known))) if known else 0.0
+        return max(self.size, alone)
+
+    @property
     def said(self) -> str:
         """What contradicts what was known before, in words."""
         far = self.far
@@ -67,6 +74,11 @@ class Departures:
         told = [f"{self.words[i]} by {number(abs(float(self.sigmas[i])), 2)}" for i in far[:SHOWN]]
         more = f" and {len(far) - SHOWN} more" if len(far) > SHOWN else ""
         return f"values contradict what was known of them before, in sigma: {', '.join(told)}{more}"
+
+
+def _most(many: int) -> float:
+    """The largest square of so many honest values, by themselves."""
+    return float(quantile(1.0 - (1.0 - SURE) / 2.0 / max(many, 1), 1))
 
 
 def departures(given: Setup, answer: Estimate) -> Departures | None:
@@ -84,12 +96,12 @@ def departures(given: Setup, answer: Estimate) -> Departures | None:
     P0, P = (np.asarray(one)[np.ix_(own, own)] for one in (problem.covariance, answer.covariance[given.solution]))
     unit = np.sqrt(np.diag(P0))
     off = (answer.mean[given.solution][own] - problem.mean[own]) / unit
-    S = (P0 + P if problem.considered else P0 - P) / np.outer(unit, unit)
-    values, vectors = np.linalg.eigh(0.5 * (S + S.T))
-    told = values > LEAST
-    along = vectors.T @ off
-    alone = np.diag(S)
-    sigmas = np.where(alone > LEAST, off / np.sqrt(np.maximum(alone, LEAST)), np.nan)
+    P0, P = P0 / np.outer(unit, unit), P / np.outer(unit, unit)
+    taken, S = P0 - P, P0 + P if problem.considered else P0 - P
+    shares, vectors = np.linalg.eigh(0.5 * (taken + taken.T))
+    told = shares > LEAST
+    along, values = vectors.T @ off, np.einsum("ij,ik,kj->j", vectors, S, vectors)
+    sigmas = np.where(np.diag(taken) > LEAST, off / np.sqrt(np.maximum(np.diag(S), LEAST)), np.nan)
     names = tuple(problem.model.names[i] for i in own)
     words = tuple(given.labels[name].words if name in given.labels else said_name(name) for name in names)
     return Departures(names, sigmas, float(np.sum(along[told] ** 2 / values[told])), int(told.sum()), words)

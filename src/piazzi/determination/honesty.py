@@ -21,11 +21,14 @@ from piazzi.evaluate.quantities import number
 from piazzi.problem.checks import Array
 
 
-def honest(given: Setup, analysis: Analysis | None, keep: Array, faults: Faults) -> Sentence:
-    """Whether residuals are as large as their sigmas say; what is known of passes that were left out is said."""
-    fitted = _fitted(given, analysis, keep, faults.reasons)
+def honest(
+    given: Setup, answer: Estimate, analysis: Analysis | None, keep: Array, faults: Faults, held: Held | None
+) -> Sentence:
+    """Whether errors are as large as sigmas say, and what explains them else; what passes were left out for is said."""
+    fitted = believable(given, answer, _fitted(given, analysis, keep, faults.reasons))
+    said = explained(given, answer, analysis, keep, unseen(fitted, held))
     more = f" Left out: {'; '.join(faults.said)}." if faults.said else ""
-    return replace(fitted, sentence=fitted.sentence + more)
+    return replace(said, sentence=said.sentence + more)
 
 
 def _fitted(given: Setup, analysis: Analysis | None, keep: Array, reasons: Array) -> Sentence:
@@ -72,7 +75,7 @@ def believable(given: Setup, answer: Estimate, fitted: Sentence) -> Sentence:
     test = f"{fitted.test}; values beside the orbit against what was known before, at {SURE:.1%} together"
     if fitted.ok is False or not found.contradict:
         return replace(fitted, test=test)
-    return Sentence(False, max(found.size, 1.0), test, f"Not honest: {found.said}.")
+    return Sentence(False, found.excess, test, f"Not honest: {found.said}.")
 
 
 def unseen(fitted: Sentence, held: Held | None) -> Sentence:

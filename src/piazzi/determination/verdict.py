@@ -10,7 +10,7 @@ from piazzi.determination.analysis import Analysis, of_orbit
 from piazzi.determination.completeness import left_out, words_for
 from piazzi.determination.faults import Faults
 from piazzi.determination.holding import Held
-from piazzi.determination.honesty import believable, explained, honest, unseen
+from piazzi.determination.honesty import honest
 from piazzi.determination.sentence import Sentence
 from piazzi.determination.setup import WIDE, Setup, scale_of
 from piazzi.estimate.estimator import Estimate
@@ -48,7 +48,6 @@ def verdict(
 ) -> dict[str, Sentence]:
     """The six of an answer, that of the first estimate; `held` is what became of rows that were held back."""
     answer = estimates[name]
-    said = believable(given, answer, honest(given, analysis, keep, faults))
     return dict(
         zip(
             KEYS,
@@ -56,7 +55,7 @@ def verdict(
                 seen(given, analysis, keep),
                 alone(given),
                 converged(given, answer, analysis, keep),
-                explained(given, answer, analysis, keep, unseen(said, held)),
+                honest(given, answer, analysis, keep, faults, held),
                 agreed(given, name, estimates),
                 complete(given, answer, analysis, keep),
             ),

@@ -33,6 +33,8 @@ SOLVERS = ("auto", "chain", "bordered")
 # iterations that a second solution may take before the first is kept
 MAX_SECOND = 20
 AS_ONE = 1e-4  # sigma, to which an orbit is found: over days rounding moves it by more than a smaller step
+FINEST = 1e-6  # asked for; less than that is found state by state
+MOST = 60  # unknowns: with more, the chain costs less
 ONE_ORBIT = 1e-4  # of the largest value: given states nearer than that to the orbit of the first are meant to be one
 
 
@@ -74,8 +76,9 @@ class FactorGraph:
     iteration: what is found is a fixed point of that.  With singular noise "cost" uses the
     pseudo-inverse of Q and stands beside "defect", the largest violation of the dynamics in prior standard deviations.
 
-    Given states that are one orbit of a problem without process noise are moved by the first alone, to 1e-4 sigma, where
-    epochs are denser than the steps that its forces ask for: ``details["solver"]`` is "batch", and `BatchLeastSquares` does it.
+    Given states that are one orbit of a problem without process noise are moved by the first alone, to 1e-4 sigma, where epochs
+    are denser than the steps that its forces ask for: ``details["solver"]`` is "batch", and `BatchLeastSquares` does it.  For a
+    `tolerance` below 1e-6, and for more than 60 unknowns, they are moved one by one.
 
     With a loss the cost is the robust one, found by iterated reweighting; the start is a filter with a gate, and where the
     solution then rejects many measurements, a window with a loss and the prior are tried too.  Tukey's and Cauchy's losses are
@@ -167,7 +170,8 @@ class FactorGraph:
         None where epochs are not dense enough for that to be faster, and where it does not end as it should.
         """
         named = isinstance(self.start, (str, Bank, Paths)) or self.solver != "auto" or self.loss is not None
-        if named or not problem.is_noise_free or not dense_steps(problem, nodes):
+        others = named or self.tolerance < FINEST or problem.model.n > MOST
+        if others or not problem.is_noise_free or not dense_steps(problem, nodes):
             return None
         chain = OrbitChain(problem, nodes)
         states, solver = with_first(chain, self._given(problem, tracking)), ShootingSolver(chain)

@@ -33,6 +33,7 @@ class OrbitChain(Chain):
         super().__init__(problem, inputs)
         self.dense = dense_steps(problem, inputs)
         self.steps = problem.steps(float(inputs.t[0]), float(inputs.t[-1]))
+        self.Phi.fill(np.nan)  # on a dense grid there is none
         self._orbit: tuple[Array, Array] | None = None
 
     def orbit(self, first: Array) -> Array:
@@ -43,7 +44,9 @@ class OrbitChain(Chain):
 
     def _followed(self, first: Array) -> tuple[Array, Array]:
         if self.dense:
-            return on_dense_grid(self.problem, self.inputs.t, first, self.dense)
+            x, W = on_dense_grid(self.problem, self.inputs.t, first, self.dense)
+            if np.isfinite(x).all():
+                return x, W
         found = arc(self.problem, self.inputs.t, first, self.steps, derivative=True)
         self.Phi[:-1] = found.Phi
         return found.x, products(found.Phi)
