@@ -127,7 +127,7 @@ def test_a_station_of_larger_biases_is_known_by_them_and_one_with_a_fault_is_not
 @pytest.mark.parametrize("role", ["estimated", "considered"])
 def test_biases_of_passes_stand_beside_other_constants_of_the_instruments(given, role):
     """Of which a considered one is no value of the model, and an estimated one is not in metres."""
-    before = approached(with_biases(given, 5, 0.1))
+    before = approached(with_biases(given, 6, 0.1))
     words = "scale.range.7090=1e-6"
     seen = with_instruments(before.measured, asked(words, None) if role == "estimated" else asked(None, words))
     found = with_pass_biases(renewed(before, seen, before.chosen))
