@@ -12,6 +12,20 @@ from piazzi.problem.dense import dense_grid, on_dense_grid, products
 from tests.determination.fixing import EPOCH, STATE, observations
 
 
+def test_a_polynomial_of_degree_7_and_its_rates_are_exact():
+    rng = np.random.default_rng(0)
+    h, c = 28.0, rng.normal(size=(8, 3))
+    at = np.arange(9.0)
+
+    def ends(s):
+        powers = s[:, None] ** np.arange(8)
+        slopes = np.arange(8) * s[:, None] ** np.maximum(np.arange(8) - 1, 0)
+        return np.stack([powers @ c, slopes @ c / h], axis=1)
+
+    s = rng.uniform(0.0, 8.0, 50)
+    np.testing.assert_allclose(sweep._between(ends(at), s, h), ends(s), rtol=1e-8, atol=1e-8)
+
+
 @pytest.mark.parametrize("many", [0, 1, 2, 7, 50])
 def test_products_of_transition_matrices(many):
     Phi = np.eye(4) + 0.1 * np.random.default_rng(many).normal(size=(many, 4, 4))
@@ -38,6 +52,8 @@ def test_epochs_within_steps_are_those_of_steps_to_each():
     for one, step_on in zip(W[1:], Phi, strict=True):
         now = step_on @ now
         assert (np.abs(one - now) <= 1e-7 * np.abs(now).max(axis=1, keepdims=True)).all()
+    far = 4.0 * t  # steps of four minutes, in which the edges of shadows are lost to a grid
+    assert not dense_grid(problem, far, 4 * step) and sweep._smooth(problem)
     short = t[:20]
     np.testing.assert_array_equal(sweep.swept(problem, short, first, step)[0], follow(problem, short, first, step)[0])
 

@@ -17,7 +17,7 @@ from piazzi.problem import Tracking
 from piazzi.problem.checks import Array
 
 DEFAULT = ("graph",)
-TOLERANCE = 1e-4  # sigma, to which batch least squares is taken
+TOLERANCE = 1e-3  # sigma, to which batch least squares is taken: below, rounding over days of orbits moves it
 
 
 def estimators(given: Any) -> dict[str, Estimator]:

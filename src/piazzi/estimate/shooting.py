@@ -11,7 +11,7 @@ import numpy as np
 from piazzi import kernels
 from piazzi.estimate.bordered import root_of
 from piazzi.estimate.chain import GRADIENT, STEP, STEP_SMOOTHED, Chain
-from piazzi.kernels import Discrete, KernelSpec
+from piazzi.kernels import Discrete, KernelSpec, bundle
 from piazzi.kernels.spec import FILLS_REGISTERS
 from piazzi.model import Model, Sensor
 from piazzi.problem import Problem
@@ -120,11 +120,16 @@ class ShootingSolver:
         n, width = problem.model.n, problem.model.width
         self.root, self.inverse, self.start = root_of(problem.covariance), np.empty((n, n)), np.empty(n)
         self.W, self.drift = np.empty((i.epochs, n, n)), np.zeros((i.epochs, n))
-        work = (*(np.empty((n, n)) for _ in range(3)), *(np.empty(n) for _ in range(4)))
-        sizes = i.epochs, n, width
-        given = i.first_row, self.W, self.drift, chain.nu, chain.H, self.root, self.start, np.diag(chain.scaling).copy()
-        found = chain.d_pred, chain.P_pred, chain.dx, self.inverse
-        self._shoot: Callable[[float], None] = lambda damping: _library().shoot(*sizes, *given, *found, *work, damping)
+        orbit = bundle.Orbit(
+            epochs=i.epochs, size=n, width=width, first_row=i.first_row, W=self.W, drift=self.drift, nu=chain.nu, H=chain.H,
+            root=self.root, start=self.start, scaling=np.diag(chain.scaling).copy(),
+        )  # fmt: skip
+        shot = bundle.Shot(
+            mean=chain.d_pred, covariance=chain.P_pred, dx=chain.dx, inverse=self.inverse,
+            **{name: np.empty((n, n)) for name in ("R", "A", "U")},
+            **{name: np.empty(n) for name in ("y", "b", "offset", "row")},
+        )  # fmt: skip
+        self._shoot: Callable[[float], None] = lambda damping: _library().shoot(orbit, shot, damping)
         if isinstance(chain, OrbitChain):
             self._follow = chain.orbit
         else:

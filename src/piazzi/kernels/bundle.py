@@ -217,3 +217,40 @@ class Accuracy(
 
 class Errors(Bundle, e="*", P="*", variance="*"):
     """Work space for the errors of `LANES` runs: errors, covariances, and their diagonals."""
+
+
+class Orbit(
+    Bundle,
+    epochs="int K",
+    size="int Z",
+    width="int V",
+    first_row="int64 K+1",
+    W="K Z Z",
+    drift="K Z",
+    nu="J V",
+    H="J V Z",
+    root="Z Z",
+    start="Z",
+    scaling="Z",
+):
+    """States of one orbit by its first: derivatives `W`, how far they are off it, their rows; root of the first one's prior.
+
+    `start` is the prior's mean less the first state, `scaling` one over the prior sigmas, for damping.
+    """
+
+
+class Shot(
+    Bundle,
+    mean="K Z",
+    covariance="K Z Z",
+    dx="K Z",
+    inverse="Z Z",
+    R="Z Z",
+    y="Z",
+    b="Z",
+    A="Z Z",
+    U="Z Z",
+    offset="Z",
+    row="Z",
+):
+    """What rows tell of one orbit: predictions with covariances, deviations; triangle R b = y, its inverse; work space."""

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import re
+from functools import lru_cache
 from math import ceil, isqrt
 
 import numpy as np
 
 from piazzi import kernels
 from piazzi.kernels.multistep import second_order
+from piazzi.model import Model
 from piazzi.problem.arcs import FEWEST, spec_of
 from piazzi.problem.checks import Array
 from piazzi.problem.problem import Problem
 
 FINER, RESOLVED = 1.5, 20  # steps of the multi-step method for one of order 8; more for fields beyond a degree of 30
 STAGES = 12  # evaluations of a step of order 8
+KINKED = 40.0  # s: the longest of them where forces have kinks
+KINKS = re.compile(r"\b(?:abs|sign|min|max|heaviside)\(")
 WORTH = 3  # times the evaluations of a grid, from which on it is the faster way by far
 BEGINNING = 10  # steps of order 8 that a grid begins with
 
@@ -21,15 +26,26 @@ BEGINNING = 10  # steps of order 8 that a grid begins with
 def dense_grid(problem: Problem, times: Array, step: float) -> int:
     """Steps of a grid instead of steps of order 8 of so many seconds, and one at least to each epoch; 0 where these are better.
 
-    For forces that are dear and without jumps, so that nothing interrupts the multi-step method.
+    For forces that are dear and without jumps, so that nothing interrupts the multi-step method.  Kinks, as the edges of
+    shadows, need short steps: in 2.75 days of LAGEOS-2 those of 20, 40, 80 s leave 2, 8, 73 mm, of order 8 and 120 s 3 mm.
     """
     smooth = not (problem.manoeuvres or problem.model.events or "burning" in problem.functions)
     if not (smooth and problem.functions and problem.is_noise_free and second_order(problem.model)):
         return 0
     degree = max((getattr(f, "degree", None) or 0 for f in problem.functions.values()), default=0)
-    count = int(np.ceil(max(FINER, degree / RESOLVED) * (times[-1] - times[0]) / step))
+    longest = step / max(FINER, degree / RESOLVED)
+    if longest > KINKED and kinked(problem.model):
+        return 0
+    count = int(np.ceil((times[-1] - times[0]) / longest))
     alone = STAGES * np.ceil(np.diff(times) / step).sum()
     return count if count >= FEWEST and alone >= WORTH * (count + STAGES * BEGINNING) else 0
+
+
+@lru_cache(maxsize=64)
+def kinked(model: Model) -> bool:
+    """Whether the motion calls a function that has jumps or kinks."""
+    texts = [*model.dynamics, *(text for one in model.definitions for text in one.texts)]
+    return any(KINKS.search(str(text)) for text in texts)
 
 
 def on_dense_grid(problem: Problem, times: Array, first: Array, count: int) -> tuple[Array, Array]:
