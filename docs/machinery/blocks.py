@@ -95,7 +95,7 @@ def shell(command: str, folder: Path) -> str:
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {command}"],
         cwd=folder, env={**os.environ, "PATH": path, "COLUMNS": str(WIDTH)}, stdin=subprocess.DEVNULL,
-        capture_output=True, text=True, timeout=300,
+        capture_output=True, text=True, timeout=900,
     )  # fmt: skip
     if done.returncode != 0:
         raise AssertionError(f"{command.strip()} ended with status {done.returncode}:\n{done.stderr}")
