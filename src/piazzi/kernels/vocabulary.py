@@ -183,7 +183,7 @@ squared_lanes: Any
 nees_lanes: Any
 # written in fragments/border.py
 rotate: Any
-invert_upper: Any
+solve_triangle: Any
 begin_border: Any
 advance_border: Any
 update_bordered: Any

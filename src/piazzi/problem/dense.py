@@ -14,9 +14,9 @@ from piazzi.model import Model
 from piazzi.problem.arcs import FEWEST, spec_of
 from piazzi.problem.checks import Array
 from piazzi.problem.problem import Problem
+from piazzi.problem.stepping import STAGES
 
 FINER, RESOLVED = 1.5, 20  # steps of the multi-step method for one of order 8; more for fields beyond a degree of 30
-STAGES = 12  # evaluations of a step of order 8
 KINKED = 40.0  # s: the longest of them where forces have kinks
 KINKS = re.compile(r"\b(?:abs|sign|min|max|heaviside)\(")
 WORTH = 3  # times the evaluations of a grid, from which on it is the faster way by far

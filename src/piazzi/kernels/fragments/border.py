@@ -39,6 +39,17 @@ def invert_upper(R, out, size):
 
 
 @inline
+def solve_triangle(R, y, inverse, b, size):
+    """The unknowns b of ``R b = y``, and the inverse of the triangle."""
+    invert_upper(R, inverse, size)
+    for i in range(size):
+        s = 0.0
+        for j in range(i, size):
+            s += inverse[i * size + j] * y[j]
+        b[i] = s
+
+
+@inline
 def begin_border(border):
     """The unknowns' prior: no deviation, unit variance; the first state through the rows of `root`, the constants later."""
     size = N + border.constants
@@ -111,11 +122,7 @@ def record_belief(k, d, P, border, whole):
     """Predicted deviation and covariance of states and constants together, unknowns included, of state k."""
     C, S, row, inverse, W = border.constants, border.S, border.row, border.inverse, border.W
     size = N + C
-    for q in range(size):
-        s = 0.0
-        for j in range(q, size):
-            s += inverse[q * size + j] * border.y[j]
-        row[q] = s
+    solve_triangle(border.R, border.y, inverse, row, size)
     mean = d
     for j in range(size):
         mean = mean + row[j] * load_vector(S, j * N, N)

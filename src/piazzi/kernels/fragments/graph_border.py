@@ -17,7 +17,6 @@ def border_solve(run: Run, start: Array, defect: Array, chain: Chain, border: Bo
             F = load_matrix(border.A, (k - 1) * N * N, N, N)
             P = symmetric(F @ P @ F.T + noise_at(k, run.scale[k], Q_matrix(run.Q), chain.Q_all))
             d = advance_border(k, d, load_vector(defect, k * N, N), border)
-        invert_upper(border.R, border.inverse, size)
         record_belief(k, d, P, border, whole)
         for c in rows:
             if not isnan(chain.nu[c]):
@@ -35,12 +34,7 @@ def border_solve(run: Run, start: Array, defect: Array, chain: Chain, border: Bo
                 border.row[j] = sqrt(damping) if j == N + i else 0.0
             value = -sqrt(damping) * border.offset[i] / border.sigma[i] if border.sigma[i] > 0.0 else 0.0
             rotate(border.R, border.y, border.row, value, size)
-    invert_upper(border.R, border.inverse, size)
-    for i in range(size):
-        s = 0.0
-        for j in range(i, size):
-            s += border.inverse[i * size + j] * border.y[j]
-        whole.unknowns[i] = s
+    solve_triangle(border.R, border.y, border.inverse, whole.unknowns, size)
     whole.widest[0] = widest
 
 

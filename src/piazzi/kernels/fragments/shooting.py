@@ -21,17 +21,6 @@ def times_root(k, orbit, A):
 
 
 @inline
-def solved_factors(shot, size):
-    """The factors that the rows so far tell, and the inverse of their triangle."""
-    invert_upper(shot.R, shot.inverse, size)
-    for q in range(size):
-        s = 0.0
-        for j in range(q, size):
-            s += shot.inverse[q * size + j] * shot.y[j]
-        shot.b[q] = s
-
-
-@inline
 def predicted_belief(k, shot, size):
     """Deviation and covariance of state k, of what the rows so far tell."""
     A, U = shot.A, shot.U
@@ -78,7 +67,7 @@ def shoot(orbit: Orbit, shot: Shot, damping: float) -> None:
     for k in range(orbit.epochs):
         times_root(k, orbit, A)
         away(k, orbit, orbit.start, offset)
-        solved_factors(shot, size)
+        solve_triangle(R, y, shot.inverse, shot.b, size)
         predicted_belief(k, shot, size)
         for c in range(orbit.first_row[k] * width, orbit.first_row[k + 1] * width):
             if not isnan(orbit.nu[c]):
@@ -97,7 +86,7 @@ def shoot(orbit: Orbit, shot: Shot, damping: float) -> None:
                 for j in range(size):
                     row[j] = weight * A[j * size + i]
                 rotate(R, y, row, -weight * offset[i], size)
-    solved_factors(shot, size)
+    solve_triangle(R, y, shot.inverse, shot.b, size)
     for i in range(size):
         s = orbit.start[i]
         for j in range(size):
