@@ -107,8 +107,9 @@ def test_what_would_do_nothing_or_is_of_another_kind(call, tmp_path, monkeypatch
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
-def test_what_a_file_says_itself_is_told(call):
-    """Ranges of lasers are of the way there and back by their format: a word for it is of no use."""
-    assert call("tracking", "lageos-2", "--range", "two-way", "--json").said == [
-        "piazzi: --range changes nothing: lageos-2 says it itself, or measures nothing of the kind"
+@pytest.mark.parametrize(("option", "word"), [("--range", "two-way"), ("--time", "GPS"), ("--time", "7090=TAI")])
+def test_what_a_file_says_itself_is_told(call, option, word):
+    """Ranges of lasers are of the way there and back, their dates UTC, by their format: a word for it is of no use."""
+    assert call("tracking", "lageos-2", option, word, "--json").said == [
+        f"piazzi: {option} changes nothing: lageos-2 says it itself, or measures nothing of the kind"
     ]

@@ -1,6 +1,7 @@
 """Window lengths: every number is the one that `compare` gives, and the full graph is timed on parts of the run."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -99,6 +100,24 @@ def test_without_truth_cost_and_nis_stand():
     assert found.realtime[0].mean_nis > 0
     assert "no truth" in str(found)
     assert found._repr_html_()
+
+
+def test_sentences_tell_who_diverged_and_how_much_covariances_say():
+    """The factor is the root of the mean NEES over its ideal, 4; who diverged (window:5 here) is named and not judged."""
+    told = trade().sentences()
+    assert [s for s in told if "diverged" in s] == [
+        "window:5 diverged: its errors stay far beyond its own covariance and do not come down enough."
+    ]
+    assert told[-1] == "Errors of 5 of 7 rows are consistent with the covariance (NEES of this one run)."
+    problem, tracking = run()
+    believed = replace(problem, stations=[replace_noise(s, 100.0) for s in problem.stations])
+    cautious = pz.windows(believed, tracking, [20], graph=False)
+    factors = sorted(np.sqrt(r.mean_nees_last_half / 4) for r in cautious.all_rows)
+    assert f"about {factors[0]:.2g} to {factors[-1]:.2g} times what the covariance predicts" in cautious.sentences()[-1]
+
+
+def replace_noise(station, factor):
+    return pz.Station(station.name, station.sensor, station.noise * factor, station.numbers, schedule=station.schedule)
 
 
 def test_one_that_fails_leaves_the_others_their_rows(monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -85,7 +86,7 @@ class SlidingWindow:
         object.__setattr__(self, "loss", loss_of(self.loss))
         for what in ("lag", "iterations"):
             value = getattr(self, what)
-            if value != int(value) or value < 1:
+            if not (isinstance(value, Real) and float(value).is_integer() and float(value) >= 1):
                 raise ValueError(f"{what} is {value}; it must be a whole number of 1 or more")
         if self.lag_seconds is not None and not 0 <= self.lag_seconds < float("inf"):
             raise ValueError(f"lag_seconds is {self.lag_seconds}; it must be zero or more")

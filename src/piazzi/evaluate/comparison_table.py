@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from piazzi.evaluate.grids import Grid, fits, rich_table
 from piazzi.evaluate.judgement import (
     claims,
+    divergences,
     errors_known,
     expected_nis,
     failing,
@@ -180,8 +181,7 @@ def sentences(model: Model, rows: Sequence[Row], values: Array) -> list[str]:
     """What the table means, in plain words: who is best, whose covariance is consistent, who failed."""
     judged = not_diverged(rows)
     out = [f"{r.estimator} did not succeed: {r.message}." for r in rows if not r.success]
-    diverged = dict.fromkeys(r.estimator for r in rows if r.success and r.diverged)
-    out += [f"{name} diverged: its errors stay far beyond its own covariance and do not come down enough." for name in diverged]
+    out += divergences(rows)
     out += dict.fromkeys(f"{r.estimator}: {r.message}." for r in rows if r.success and r.message)
     out += [*_rejected(rows, len(values)), *_modes(rows)]
     known = errors_known(judged)

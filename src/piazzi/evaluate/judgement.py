@@ -53,6 +53,12 @@ def not_diverged(rows: Sequence[Row]) -> list[Row]:
     return [r for r in rows if r.success and not r.diverged]
 
 
+def divergences(rows: Sequence[Row]) -> list[str]:
+    """A sentence for each estimator that diverged."""
+    names = dict.fromkeys(r.estimator for r in rows if r.success and r.diverged)
+    return [f"{name} diverged: its errors stay far beyond its own covariance and do not come down enough." for name in names]
+
+
 def errors_known(rows: Sequence[Row]) -> bool:
     """Whether any error is known, so that errors are judged; else innovations are."""
     return any(v is not None for r in rows for v in r.rmse.values())

@@ -10,7 +10,7 @@ import numpy as np
 from piazzi.drawn import Drawn
 from piazzi.evaluate.comparison_table import PASSED, row_display
 from piazzi.evaluate.grids import Grid
-from piazzi.evaluate.judgement import claims, failing, tested
+from piazzi.evaluate.judgement import claims, divergences, failing, tested
 from piazzi.evaluate.quantities import duration, ends, finite, ideal, number
 from piazzi.evaluate.rows import Row, numbers
 from piazzi.evaluate.tabled import Tabled
@@ -187,6 +187,7 @@ class WindowTrade(Tabled, Drawn):
                 smallest = f"{number(best * show.factor)}{show.suffix} (RMS), with {lag}"
                 enough = _enough(self.lags, errors, best)
                 out.append(f"{name}, the smallest {group} error of the last half is {smallest}; {enough}.")
+        out += divergences(self.all_rows)
         for claim in claims(self.all_rows, self.tracking.values):
             who = "all rows" if len(claim.rows) == len(self.all_rows) else f"{len(claim.rows)} of {len(self.all_rows)} rows"
             out.append(f"Errors of {who} are {claim.text} (NEES of this one run).")

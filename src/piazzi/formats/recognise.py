@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib import import_module
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from piazzi.formats import table_header
 from piazzi.formats.conventions import Conventions, with_conventions, without_effect
@@ -131,9 +133,27 @@ def read_tracking(*paths: str | os.PathLike[str], **conventions: Any) -> Observa
     if told.columns and FORMATS[TABLE] not in forms:
         raise ValueError(f"--columns says what columns of tables are: {first} is none")
     unread = [f"--{name}" for name, of in _READ_BY.items() if told.option(name) and not any(FORMATS[k] in forms for k in of)]
+    if told.scales and _says_scales(rows, paths, told):
+        unread.append("--time")
     for option in (*unread, *without_effect(rows, told)):
         _log.info("%s changes nothing: %s says it itself, or measures nothing of the kind", option, first)
     return with_conventions(rows, told)
+
+
+def _says_scales(rows: Observations, paths: Iterable[str | os.PathLike[str]], told: Conventions) -> bool:
+    """Whether files mean the same rows when nothing is told of time scales."""
+    from piazzi.formats.joining import concatenate
+
+    try:
+        alone = concatenate(_tracking(path, replace(told, scales=()), []) for path in paths)
+    except ValueError:
+        return False
+    return (
+        alone.open == rows.open
+        and alone.segments == rows.segments
+        and alone.epoch == rows.epoch
+        and np.array_equal(alone.t, rows.t)
+    )
 
 
 def tracking_of(data: bytes, name: str, **conventions: Any) -> Observations:
