@@ -30,8 +30,8 @@ def test_operators_are_resolved_once_for_their_types(monkeypatch):
 @pytest.mark.parametrize("source", [DOUBLED, "raise OSError"])
 def test_no_garbage_is_looked_for_while_kernels_are_compiled(enabled, source, monkeypatch):
     seen = []
-    original = build.module_of
-    monkeypatch.setattr(build, "module_of", lambda text: (seen.append(gc.isenabled()), original(text))[1])
+    original = build.fill
+    monkeypatch.setattr(build, "fill", lambda *given: (seen.append(gc.isenabled()), original(*given))[1])
     was = gc.isenabled()
     (gc.enable if enabled else gc.disable)()
     try:

@@ -13,6 +13,7 @@ from types import ModuleType
 from piazzi.kernels.entries import signatures
 from piazzi.kernels.library import Entry, PlainEntry
 from piazzi.kernels.settings import own_settings
+from piazzi.kernels.shared import fill
 
 UNKNOWN_INSIDE = (ImportError, AttributeError, TypeError)
 _pausing = False
@@ -73,13 +74,17 @@ def note_source(source: str, error: Exception) -> None:
 
 def _compiled(source: str) -> tuple[dict[str, bytes], dict[str, tuple[str, tuple[str, ...]]]]:
     with own_settings(), _garbage_kept():
+        from piazzi.kernels.compiled import SHARED
         from piazzi.kernels.compiler import calls_resolved_once, object_code
 
         with calls_resolved_once():
-            module = module_of(source)
+            module = ModuleType("piazzi_generated")
+            fill(module, source, SHARED)
         callbacks = {name: (getattr(module, name), takes) for name, takes in signatures(source).items()}
         objects = {name: object_code(callback) for name, (callback, _) in callbacks.items()}
         symbols = {name: (callback.native_name, takes) for name, (callback, takes) in callbacks.items()}
+        for name in callbacks:  # what is shared keeps the module
+            delattr(module, name)
     return objects, symbols
 
 

@@ -60,6 +60,7 @@ globals().update(
 )
 Array = types.CPointer(types.float64)
 Indices = types.CPointer(types.int64)
+SHARED: dict[str, Any] = {}  # what `shared` remembers of the generated modules of this process
 _SCALARS = {int: types.int64, float: types.float64}
 
 

@@ -20,12 +20,12 @@ the factors of an update.  The functions:
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from piazzi.kernels.multistep import multistep_source
-from piazzi.kernels.printer import function, in_time
+from piazzi.kernels.printer import call_of, function, in_time, with_used
 from piazzi.kernels.quadrature import rule_source
 from piazzi.kernels.sizes import ROWS, sizes_source
 from piazzi.kernels.steps import adaptive_source, axes_source, kepler_source, runge_kutta_source
@@ -72,20 +72,19 @@ def _apart(source: str) -> str:
     return "".join(_inline(f"apart_{name}(a)", f"return {name}(a)", mark="outlined") for name in called) + source
 
 
-def _arguments(model: Model, extra: Sequence[str] = (), beside: str = "") -> tuple[list[str], dict[sp.Symbol, str], str]:
-    """Argument names, the symbols they stand for, and the call from the state `x` and what is given, `p`.
+def _arguments(model: Model, extra: Sequence[str] = (), beside: str = "") -> tuple[dict[str, str], dict[sp.Symbol, str]]:
+    """What stands for each argument in calls, from the state `x` and what is given, `p`; and the symbols that arguments are.
 
     The equations of motion have the side of each event besides: `beside` says what is called for it, with its number for {}.
     """
     d = derive(model)
     names = {s: f"x{i}" for i, s in enumerate(d.x)} | {s: f"p{i}" for i, s in enumerate(d.p)} | {d.t: "t"}
-    arguments = ["t", *extra, *(f"x{i}" for i in range(len(d.x))), *(f"p{i}" for i in range(len(d.p)))]
-    call = ", ".join(["t", *extra, *(f"x[{i}]" for i in range(len(d.x))), *(f"p.parameters[{i}]" for i in range(len(d.p)))])
+    given = {a: a for a in ("p", "t", *extra)}
+    given |= {f"x{i}": f"x[{i}]" for i in range(len(d.x))} | {f"p{i}": f"p.parameters[{i}]" for i in range(len(d.p))}
     if beside:
         names |= {s: f"side{i}" for i, s in enumerate(d.sides)}
-        arguments += [f"side{i}" for i in range(len(d.sides))]
-        call += "".join(f", {beside.format(i)}" for i in range(len(d.sides)))
-    return (["p", *arguments], names, f"p, {call}") if model.reads_data else (arguments, names, call)
+        given |= {f"side{i}": beside.format(i) for i in range(len(d.sides))}
+    return given, names
 
 
 def _identity_source(model: Model) -> str:
@@ -156,28 +155,29 @@ def _unpack(names: Sequence[str], call: str) -> str:
     return f"({', '.join(names)},) = {call}"
 
 
+def _function(*what: Any) -> str:
+    return with_used(function(*what))
+
+
 def _dynamics_source(model: Model) -> str:
-    d, (arguments, names, call) = derive(model), _arguments(model, beside="0.0")
+    d, (given, names) = derive(model), _arguments(model, beside="0.0")
     nd, n, called = len(model.moving), model.n, _called(model)
     F = _Jacobian(d.F, "F", called)
     rates = [f"f{i}" for i in range(nd)]
     whole = f"alike(x, {', '.join(rates + ['0.0'] * (n - nd))})"
     rows = ", ".join(F.row_times(i, _rows(model), n) for i in range(nd))
+    f = _function("scalar_f", [*given], names, list(d.f), d.values, called)
+    f_F = _function("scalar_f_F", [*given], names, list(d.f) + F.outputs, d.partials, called + F.called)
 
-    def rates_by(suffix: str, call: str) -> str:
-        value, both = _unpack(rates, f"scalar_f({call})"), _unpack(rates + F.names, f"scalar_f_F({call})")
+    def rates_by(suffix: str, given: Mapping[str, str]) -> str:
+        value, both = _unpack(rates, call_of(f, given)), _unpack(rates + F.names, call_of(f_F, given))
         source = _inline(f"dynamics{suffix}(t, x, p)", value, f"return {whole}")
         source += _inline(f"rhs{suffix}(t, x, R, p)", both, f"return {whole}, matrix({rows})")
-        for name, given in (("dynamics", "t, x, p"), ("rhs", "t, x, R, p")) if model.reads_data else ():
-            source += _inline(f"{name}{suffix}_outlined({given})", f"return {name}{suffix}({given})", mark="outlined")
+        for name, taken in (("dynamics", "t, x, p"), ("rhs", "t, x, R, p")) if model.reads_data else ():
+            source += _inline(f"{name}{suffix}_outlined({taken})", f"return {name}{suffix}({taken})", mark="outlined")
         return source
 
-    return (
-        function("scalar_f", arguments, names, list(d.f), d.values, called)
-        + function("scalar_f_F", arguments, names, list(d.f) + F.outputs, d.partials, called + F.called)
-        + rates_by("", call)
-        + (rates_by("_beside", _arguments(model, beside=SIDE)[2]) if model.events else "")
-    )
+    return f + f_F + rates_by("", given) + (rates_by("_beside", _arguments(model, beside=SIDE)[0]) if model.events else "")
 
 
 def _step_source(model: Model, scheme: tuple[Any, ...]) -> str:
@@ -196,13 +196,14 @@ def _events_source(model: Model, lanes: int) -> str:
 
     Where an event depends on states alone whose rates are states, as a shadow's edge does, no rate is evaluated for it.
     """
-    d, f, (arguments, names, call) = derive_events(model), derive(model), _arguments(model)
+    d, f, (given, names) = derive_events(model), derive(model), _arguments(model)
     nd, n, count = len(model.moving), model.n, len(model.events)
     called = [f"event {name}" for name, _ in model.events]
     J, moving = _Jacobian(d.G, "G", called), list(f.x)
     rate = [f"x[{moving.index(f.f[i])}]" if f.f[i] in moving else f"f[{i}]" for i in range(nd)]
     values = [f"g{e}" for e in range(count)]
-    unpack = _unpack(values + J.names, f"scalar_g({call})")
+    g = _function("scalar_g", [*given], names, list(d.g) + J.outputs, d.partials, called + J.called)
+    unpack = _unpack(values + J.names, call_of(g, given))
     rates, row = [], [unpack, "row = unit(-1, N)"]
     for e in range(count):
         terms = [J.entry(e, n), *(f"{J.entry(e, i)}*{rate[i]}" for i in range(nd) if J.entry(e, i))]
@@ -213,7 +214,7 @@ def _events_source(model: Model, lanes: int) -> str:
     into = [f"p.work[at + {i}] = {text}" for i, text in enumerate(values + rates)]
     return (
         f"EVENTS = {count}\nEVENTS_WORK = {6 * count}\nEVENTS_LANES = {2 * count * lanes}\n\n\n"
-        + function("scalar_g", arguments, names, list(d.g) + J.outputs, d.partials, called + J.called)
+        + g
         + _inline("events_of(t, x, p)", *both, f"return vector({', '.join(values + rates)})", mark="outlined")
         + _inline("events_into(t, x, p, at)", *both, *into, mark="outlined")
         + _inline("event_row(t, x, p, event)", *row, "return row", mark="outlined")
@@ -238,7 +239,7 @@ def _any_step_source(model: Model, scheme: tuple[Any, ...]) -> str:
 def _constant_acceleration_source(model: Model) -> str:
     """The step of the founding text; its derivative needs F of the rates alone, so it costs no more than they do."""
     d, (nxt, h) = derive(model), constant_acceleration_step(model)
-    arguments, names, call = _arguments(model, ("h",), SIDE)
+    given, names = _arguments(model, ("h",), SIDE)
     names = {**names, h: "h"}
     nd, n, called = len(model.moving), model.n, _called(model)
     F, rows = _Jacobian(d.F, "F", called), _rows(model)
@@ -250,13 +251,15 @@ def _constant_acceleration_source(model: Model) -> str:
     products = [f"K{j} = {F.row_times(j, rows, n)}" for j in used]
     products += [f"V{j} = R[{j}] + h*K{j}" for j in used]
     new = [f"V{i}" if i == j else f"R[{i}] + half*(R[{j}] + V{j})" for i, j in enumerate(rates)]
+    step = _function("scalar_step", [*given], names, list(nxt), d.values, called)
+    step_F = _function("scalar_step_F", [*given], names, list(nxt) + F.outputs, d.partials, called + F.called)
     return (
-        function("scalar_step", arguments, names, list(nxt), d.values, called)
-        + function("scalar_step_F", arguments, names, list(nxt) + F.outputs, d.partials, called + F.called)
-        + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
+        step
+        + step_F
+        + _inline("substep(t, h, x, p)", _unpack(results, call_of(step, given)), f"return {whole}")
         + _inline(
             "substep_jacobian(t, h, x, R, p)",
-            _unpack(results + F.names, f"scalar_step_F({call})"),
+            _unpack(results + F.names, call_of(step_F, given)),
             "half = 0.5*h",
             *products,
             f"return {whole}, matrix({', '.join(new)})",
@@ -266,20 +269,22 @@ def _constant_acceleration_source(model: Model) -> str:
 
 def _map_source(model: Model) -> str:
     """A step given as a formula: its Jacobian is derived."""
-    d, (arguments, names, call) = derive(model), _arguments(model, ("h",))
+    d, (given, names) = derive(model), _arguments(model, ("h",))
     names = {**names, d.dt: "h"}
     nd, n, called = len(model.moving), model.n, _called(model)
     G = _Jacobian(d.F, "G", called)
     results = [f"n{i}" for i in range(nd)]
     whole = f"alike(x, {', '.join(results + [f'x[{i}]' for i in range(nd, n)])})"
     rows = ", ".join(G.row_times(i, _rows(model), n) for i in range(nd))
+    step = _function("scalar_step", [*given], names, list(d.f), d.values, called)
+    step_G = _function("scalar_step_G", [*given], names, list(d.f) + G.outputs, d.partials, called + G.called)
     return (
-        function("scalar_step", arguments, names, list(d.f), d.values, called)
-        + function("scalar_step_G", arguments, names, list(d.f) + G.outputs, d.partials, called + G.called)
-        + _inline("substep(t, h, x, p)", _unpack(results, f"scalar_step({call})"), f"return {whole}")
+        step
+        + step_G
+        + _inline("substep(t, h, x, p)", _unpack(results, call_of(step, given)), f"return {whole}")
         + _inline(
             "substep_jacobian(t, h, x, R, p)",
-            _unpack(results + G.names, f"scalar_step_G({call})"),
+            _unpack(results + G.names, call_of(step_G, given)),
             f"return {whole}, matrix({rows})",
         )
     )
@@ -290,21 +295,19 @@ def _sensor_source(model: Model) -> str:
     measure_lanes, innovate_lanes = [], []
     for index, sensor in enumerate(model.sensors):
         d = derive_sensor(model, sensor)
-        arguments, names, call = _arguments(model)
-        arguments += [f"s{i}" for i in range(len(d.own))]
+        given, names = _arguments(model)
+        given |= {f"s{i}": f"s[at + {i}]" for i in range(len(d.own))}
         names |= {s: f"s{i}" for i, s in enumerate(d.own)}
-        call += "".join(f", s[at + {i}]" for i in range(len(d.own)))
         called = [f"{component} of sensor {sensor.name}" for component in sensor.components]
         J = _Jacobian(d.H, "H", called)
         seen = [f"h{i}" for i in range(sensor.width)]
-        functions += [
-            function(f"scalar_h{index}", arguments, names, list(d.h), d.values, called),
-            function(f"scalar_h{index}_H", arguments, names, list(d.h) + J.outputs, d.partials, called + J.called),
-        ]
+        h = _function(f"scalar_h{index}", [*given], names, list(d.h), d.values, called)
+        h_H = _function(f"scalar_h{index}_H", [*given], names, list(d.h) + J.outputs, d.partials, called + J.called)
+        functions += [h, h_H]
         guard = f"if sensor == {index}:" if len(model.sensors) > 1 else "if True:"
-        measure += [guard, "    " + _unpack(seen, f"scalar_h{index}({call})")]
+        measure += [guard, "    " + _unpack(seen, call_of(h, given))]
         measure += [f"    out[row + {i}] = " + (f"h{i}" if i < sensor.width else "nan") for i in range(model.width)]
-        innovate += [guard, "    " + _unpack(seen + J.names, f"scalar_h{index}_H({call})")]
+        innovate += [guard, "    " + _unpack(seen + J.names, call_of(h_H, given))]
         for i, angle in enumerate(sensor.is_angle):
             scale, put_on_sky = _on_sky(sensor, i, "z[row + {}]")
             difference = f"z[row + {i}] - h{i}"
@@ -313,9 +316,9 @@ def _sensor_source(model: Model) -> str:
             innovate.append(f"    nu[out + {i}] = unless_missing(z[row + {i}], {scale}({difference}))")
             innovate.append(f"    store(H, (out + {i}) * {model.n}, {scale}{J.dense_row(i)})")
         innovate += [f"    nu[out + {i}] = nan" for i in range(sensor.width, model.width)]
-        measure_lanes += [guard, "    " + _unpack(seen, f"scalar_h{index}({call})")]
+        measure_lanes += [guard, "    " + _unpack(seen, call_of(h, given))]
         measure_lanes.append(f"    store_packs(h, 0, vector({', '.join(seen)}), LANES)")
-        innovate_lanes += [guard, "    " + _unpack(seen + J.names, f"scalar_h{index}_H({call})")]
+        innovate_lanes += [guard, "    " + _unpack(seen + J.names, call_of(h_H, given))]
         for i, angle in enumerate(sensor.is_angle):
             scale, put_on_sky = _on_sky(sensor, i, "load_packs(z, {} * LANES, 1, LANES)[0]")
             difference = f"load_packs(z, {i} * LANES, 1, LANES)[0] - h{i}"

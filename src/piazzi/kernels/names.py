@@ -79,11 +79,11 @@ def provided(tree: ast.Module) -> list[str]:
     return out
 
 
-def needed(function: ast.FunctionDef) -> set[str]:
-    """Names that a function takes from outside of itself."""
-    names = [node for node in ast.walk(function) if isinstance(node, ast.Name)]
-    own = {a.arg for a in ast.walk(function.args) if isinstance(a, ast.arg)}
-    own |= {node.id for node in names if isinstance(node.ctx, ast.Store)}
+def needed(statement: ast.stmt) -> set[str]:
+    """Names that a function, or what is assigned, takes from outside of itself."""
+    inside = [*ast.walk(statement)]
+    names = [node for node in inside if isinstance(node, ast.Name)]
+    own = {a.arg for a in inside if isinstance(a, ast.arg)} | {node.id for node in names if isinstance(node.ctx, ast.Store)}
     return {node.id for node in names if isinstance(node.ctx, ast.Load)} - own
 
 

@@ -7,6 +7,7 @@ The source has no branches, so the same text serves floats and vector lanes.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, TypeVar
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 A = TypeVar("A")
 T = TypeVar("T")
 CONVERGED = 1e-12  # of what is zero at a root, relative to its terms
+_HEAD, _NAME = re.compile(r"(@inline\ndef \w+)\(([^)]*)\):\n(.*)", re.S), re.compile(r"\b[A-Za-z_]\w*")
 _SLOW = 4  # cycles of a root or a quotient, in multiplications
 
 
@@ -194,8 +196,24 @@ def function(
     writer, called = _Writer(names), called or [name] * len(outputs)
     in_time(lambda i: f"definition {stages[i].symbols[0]}", lambda stage: _define(writer, stage), stages)
     results = _written(writer, outputs, called)
-    body = [*writer.lines, f"return ({', '.join(results)},)"]
-    return f"@inline\ndef {name}({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in body) + "\n\n"
+    body = "".join(f"    {line}\n" for line in [*writer.lines, f"return ({', '.join(results)},)"])
+    return f"@inline\ndef {name}({', '.join(arguments)}):\n{body}\n\n"
+
+
+def with_used(source: str) -> str:
+    """The source of a function with the arguments that it uses: whatever a problem has besides, it stays the same.
+
+    It is then compiled once for all of them.
+    """
+    head, taken, body = _HEAD.findall(source)[0]
+    used = {*_NAME.findall(body)}
+    return f"{head}({', '.join(a for a in taken.split(', ') if a in used)}):\n{body}"
+
+
+def call_of(source: str, given: Mapping[str, str]) -> str:
+    """A call of the function of a source: `given` has the text of each argument that it may take."""
+    head, taken, _ = _HEAD.findall(source)[0]
+    return f"{head.split()[-1]}({', '.join(given[a] for a in taken.split(', ') if a)})"
 
 
 def in_time(called: Callable[[int], str], write: Callable[[A], T], items: Sequence[A]) -> list[T]:
