@@ -8,15 +8,26 @@ import pytest
 from piazzi.determination import density
 from piazzi.determination.approach import approached
 from piazzi.determination.course import _estimated_air, _with_density, course_of
-from piazzi.determination.density import with_density
-from piazzi.determination.determining import ready, solved
+from piazzi.determination.density import Law, with_density
+from piazzi.determination.determining import prepared, ready, solved
 from piazzi.determination.fit import estimators
 from piazzi.determination.orbit_forces import AirVaries, air_varies
-from piazzi.determination.physical import air_of, is_node, nodes_of
+from piazzi.determination.physical import air_of, believed, is_node, nodes_of, said, share_of, slope_of, value_of
 from piazzi.determination.setup import follow
 from piazzi.estimate.chi_square import quantile
 from piazzi.orbit import state_axes
-from tests.references.determinations import AIR, KINDS, begun, consistency, drawn, predictions, within
+from tests.references.determinations import (
+    AIR,
+    KINDS,
+    begun,
+    consistency,
+    drawn,
+    predictions,
+    ranges,
+    seen_rows,
+    station,
+    within,
+)
 
 
 @pytest.mark.slow
@@ -53,16 +64,26 @@ def test_density_is_a_gauss_markov_process_at_its_nodes(low):
     np.testing.assert_allclose(P, law, rtol=1e-12)
     np.testing.assert_allclose([t[0], t[-1]], given.tracking.times[[0, -1]], atol=1e-6)
     assert sum(f"is estimated at {len(t)} times" in text for text in given.assumed) == 1
-    # between nodes it is linear, and it goes back to the model's outside: by the rate of a coefficient that is as much larger
+    # the coefficient has the mean and sigma of before, and is log-normal: exp(m + v/2), and sqrt(exp(v) - 1) of that
+    m, v = (of[names.index("cd_a_m_log")] for of in (given.problem.mean, np.diag(given.problem.covariance)))
+    assert (np.exp(m + v / 2.0), np.sqrt(np.expm1(v))) == pytest.approx((1.0, 0.5))
+    # its logarithm is linear between nodes; outside it has the mean of a log-normal that is known there: exp(mean + variance/2)
     mean = given.problem.mean.copy()
     mean[:6], mean[where] = low.states[0][:6], np.random.default_rng(0).standard_normal(len(where))
-    nodes = root @ mean[where]
+    steady = -(varies.sigma**2) / 2.0
+    nodes = said(given.problem, mean)[0][where]
+    np.testing.assert_allclose(nodes, steady + root @ mean[where], rtol=1e-13)
+    assert believed(given.problem, names[where[-1]]) == pytest.approx((steady, varies.sigma))
+    mean[names.index("cd_a_m_log")] = np.log(1.3)
+    before = low.problem
+    assert before.model.names[6:] == ("cd_a_m_share",)
     for when in (t[2] + 0.25 * (t[3] - t[2]), t[0] - 7200.0, t[-1] + 7200.0):
-        inside = np.interp(when, t, nodes) * np.exp(-max(t[0] - when, when - t[-1], 0.0) / varies.time)
-        other = given.problem.mean.copy()
-        other[:6] = mean[:6]
-        other[names.index("cd_a_m_share")] += inside
-        np.testing.assert_allclose(given.problem.dynamics(mean, when), given.problem.dynamics(other, when), rtol=1e-13)
+        left = np.exp(-max(t[0] - when, when - t[-1], 0.0) / varies.time)
+        middle = steady + (np.interp(when, t, nodes) - steady) * left
+        factor = np.exp(middle + varies.sigma**2 * (1.0 - left**2) / 2.0)
+        other = replace(before, parameters={**before.parameters, "cd_a_m": before.parameters["cd_a_m"] * factor})
+        at = np.append(mean[:6], share_of(1.3))
+        np.testing.assert_allclose(given.problem.dynamics(mean, when)[:6], other.dynamics(at, when)[:6], rtol=1e-12)
 
 
 @pytest.mark.slow
@@ -82,28 +103,62 @@ def test_predictions_through_a_density_that_varies_are_as_good_as_they_say():
 
 @pytest.mark.slow
 def test_a_departure_that_never_ends_is_a_wrong_coefficient():
-    """With an infinite time the departure multiplies the coefficient: its effect is the derivative by it, once over."""
+    """With an infinite time it multiplies the coefficient by a log-normal factor, whose variance is exp(sigma^2) - 1."""
     given = begun(AIR)
     last, first = given.tracking.times[-1], given.states[-1]
     t = np.array([last - 10.0, last + 40000.0, last + 86400.0])
+    place = given.problem.model.names.index("cd_a_m_share")
 
     class Estimate:
-        times, mean = given.tracking.times, given.states
+        times, mean, covariance = given.tracking.times, given.states, np.zeros((1, len(first), len(first)))
 
-    given = replace(given, chosen=replace(given.chosen, air_varies=AirVaries(0.1, 1e15)))
+    given = replace(given, chosen=replace(given.chosen, air_varies=AirVaries(0.5, 1e15)))
     found = density.departure(given, Estimate, t)
-    place = given.problem.model.names.index("cd_a_m_share")
     Phi = follow(given.problem, np.array([last, *t[1:]]), first, given.chosen.max_step)[1]
-    by = (Phi[1] @ Phi[0])[:6, place] * 0.1
+    by = (Phi[1] @ Phi[0])[:6, place] * value_of(first[place]) / slope_of(first[place])
+    law = np.expm1(0.25) * np.outer(by, by)
     assert not found[0].any()
-    np.testing.assert_allclose(found[2], np.outer(by, by), rtol=1e-4, atol=1e-4 * np.abs(np.outer(by, by)).max())
+    np.testing.assert_allclose(found[2], law, rtol=1e-4, atol=1e-4 * np.abs(law).max())
+    # a coefficient c of variance v has the mean square c^2 + v
+    Estimate.covariance[-1, place, place] = 3.0 * (value_of(first[place]) / slope_of(first[place])) ** 2
+    np.testing.assert_allclose(density.departure(given, Estimate, t)[2], 4.0 * found[2], rtol=1e-12)
+
+
+@pytest.mark.parametrize("known", (True, False))
+def test_processes_beside_a_state_make_the_covariance_of_a_log_normal_density(known):
+    """Of exp(g) over its mean it is exp(C(t, t')) - 1, with C the covariance of g from where that is known, or steady."""
+    sigma, time = 0.4, 5000.0
+    for t, later in ((100.0, 100.0), (500.0, 4000.0), (9000.0, 30000.0)):
+        own = Law(sigma, time, known).variances(t)
+        sum_of_processes = own @ np.exp(-np.array(density.ORDERS) * (later - t) / time)
+        C = sigma**2 * (np.exp(-(later - t) / time) - known * np.exp(-(later + t) / time))
+        assert sum_of_processes == pytest.approx(np.expm1(C), rel=3e-5)
+
+
+@pytest.fixture(scope="module")
+def found():
+    """A determination of a low orbit, the density among what is estimated."""
+    return solved(ready(drawn(AIR, begun(AIR), 3)[0]), estimators(("graph",)))
 
 
 @pytest.mark.slow
-def test_a_file_of_a_determination_predicts_as_surely_as_the_determination():
+def test_the_next_night_knows_coefficient_and_density_as_results_have_them(found):
+    """The prior of its own unknowns, told as results tell it, is what the first night says at its epoch."""
+    t, which = seen_rows(AIR)
+    facts = {**found.to_dict(), "verdict": {}}  # which may make sigmas larger
+    rows = ranges(AIR, t + float(found.estimate.times[-1]) + 60.0, which)
+    given = with_density(prepared(rows, prior=facts, stations=[station(n) for n in AIR.sites], **AIR.words))
+    told, J = said(given.problem, given.problem.mean)
+    P = J @ given.problem.covariance @ J.T
+    own = [given.problem.model.names.index(name) for name in ("cd_a_m_log", "air_1", "density_cos")]
+    where = [facts["names"].index(name) for name in ("cd_a_m", f"density_{len(facts['density'])}", "density_cos")]
+    np.testing.assert_allclose(told[own], np.array(facts["mean"])[where], rtol=1e-12)
+    np.testing.assert_allclose(P[np.ix_(own, own)], np.array(facts["covariance"])[np.ix_(where, where)], rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_file_of_a_determination_predicts_as_surely_as_the_determination(found):
     """That of before held the density at its last value for sure: three days on its sigma was a third of what it is."""
-    given = begun(AIR)
-    found = solved(ready(drawn(AIR, given, 3)[0]), estimators(("graph",)))
     read = course_of(found.to_dict(), found.epoch)
     last = found.estimate.mean[-1]  # the same forces, the waves of the density over a turn among them
     moved = read.problem.dynamics(read.problem.mean, 0.0)[3:6]
@@ -120,16 +175,14 @@ def test_a_file_of_a_determination_predicts_as_surely_as_the_determination():
         assert (np.abs(axes @ (there[0, :3] - x[:3])) < 0.1 * sigma).all()
 
 
-def test_the_density_of_a_file_is_that_at_its_epoch_in_units_of_the_coefficient():
-    """Between nodes it is linear, as it was estimated: c (3 d1 + d2)/4, beside c w for a wave, with a covariance of its own."""
+def test_the_density_of_a_file_is_that_at_its_epoch():
+    """Between nodes its logarithm is linear, as it was estimated: (3 d1 + d2)/4, beside a wave."""
     names, dates = ["x", "cd_a_m", "density_1", "density_2", "density_cos"], [-3600.0, 10800.0]
     P = np.diag([1.0, 0.04, 0.09, 0.16, 0.25])
     mean, wide = _with_density(dates, names, np.array([0.0, 2.0, 0.2, -0.2, 0.3]), P)
-    assert mean.tolist() == pytest.approx([0.0, 2.0, 0.2, 2.0 * 0.1, 2.0 * 0.3])
-    by_drag, by_share = np.array([0.1, 0.3]), 2.0 * np.array([[0.75, 0.25, 0.0], [0.0, 0.0, 1.0]])
-    expected = 0.04 * np.outer(by_drag, by_drag) + by_share @ P[2:, 2:] @ by_share.T
-    np.testing.assert_allclose(wide[np.ix_([3, 4], [3, 4])], expected, rtol=1e-14)
-    np.testing.assert_allclose(wide[1, [1, 3, 4]], 0.04 * np.array([1.0, 0.1, 0.3]), rtol=1e-14)
+    assert mean.tolist() == pytest.approx([0.0, 2.0, 0.2, 0.1, 0.3])
+    assert wide[3, 3] == pytest.approx(0.75**2 * 0.09 + 0.25**2 * 0.16) and wide[3, 2] == pytest.approx(0.75 * 0.09)
+    assert wide[4, 4] == 0.25 and wide[1].tolist() == [0.0, 0.04, 0.0, 0.0, 0.0]
     assert _estimated_air(names, dates, dict.fromkeys(names)) == ["density_2", "density_cos"]
     assert not _estimated_air(names, [], dict.fromkeys(names)) and not _estimated_air(names, dates, {})
 

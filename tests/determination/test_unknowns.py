@@ -7,7 +7,18 @@ import piazzi as pz
 from piazzi.determination.burns import Burn, burns_of
 from piazzi.determination.earlier import STATES, Earlier
 from piazzi.determination.motion import Extra, Numbers
-from piazzi.determination.physical import USUAL, at_rest, believed, by_shares, result_name, said, said_name, share_of, value_of
+from piazzi.determination.physical import (
+    USUAL,
+    at_rest,
+    believed,
+    by_shares,
+    result_name,
+    said,
+    said_name,
+    share_of,
+    value_of,
+    worth,
+)
 from piazzi.determination.ramps import RAMP, pieces, profiles
 from piazzi.determination.unknowns import Label, asked, considered, listed
 from piazzi.outside.function import Function
@@ -198,10 +209,13 @@ def test_coefficients_are_positive_whatever_is_estimated():
     share = np.linspace(0.2, 5.0, 50)
     np.testing.assert_allclose(value_of(share), share, atol=0.05)
     np.testing.assert_allclose(share_of(value_of(share)), share, rtol=1e-12)
+    for name, x in (("cd_a_m_share", 0.3), ("cd_a_m_log", -0.7)):
+        value, slope = worth(name, x)
+        assert value > 0 and slope == pytest.approx((worth(name, x + 1e-6)[0] - worth(name, x - 1e-6)[0]) / 2e-6)
     assert believed(problem, "cd_a_m_share") == pytest.approx((0.02, 0.01), rel=0.01)
     assert believed(problem, "cr_a_m_share") == pytest.approx((0.013, 0.0013), rel=0.01)
-    assert [said_name(n) for n in ("cd_a_m_2_share", "cd_a_m_change", "air_3", "range_share")] == [
-        "cd_a_m_2", "cd_a_m_change", "density_3", "range_share",
+    assert [said_name(n) for n in ("cd_a_m_2_share", "cd_a_m_log", "cd_a_m_change", "air_3", "range_share")] == [
+        "cd_a_m_2", "cd_a_m", "cd_a_m_change", "density_3", "range_share",
     ]  # fmt: skip
 
 

@@ -17,9 +17,11 @@ from piazzi.determination import Guess
 from piazzi.determination.beliefs import beliefs
 from piazzi.determination.determining import _answered, prepared, ready, solved
 from piazzi.determination.fit import estimators
+from piazzi.determination.motion import Extra, instead
 from piazzi.determination.orbit_forces import AirVaries
-from piazzi.determination.physical import share_of, value_of
-from piazzi.determination.setup import at_last_used, follow
+from piazzi.determination.physical import share_of
+from piazzi.determination.setup import at_last_used, follow, renewed
+from piazzi.earth.force_text import LATITUDE
 from piazzi.earth.tabulated import Place
 from piazzi.estimate.chi_square import quantile
 from piazzi.evaluate.information import predicted
@@ -159,21 +161,28 @@ AIR = Kind(
     "gravity=EGM2008 degree=12 drag=harris-priester radiation=no cd_a_m=0.02", "cd=0.5",
 )  # fmt: skip
 PROCESS = replace(AIR, estimate="cd=0.5 cd~24h=0.32")
-PIECE = 3600.0  # s, in which the density of a truth keeps to its share
-LEAST = 0.05  # of the density of the model, that there is always
+PIECE = 3600.0  # s, in which the density of a truth over that of its model is the same
+TRUE = ("true_air", "true_cos", "true_sin")
 
 
-def flown(given, first, times, share):
-    """States (K, n) of an orbit through air whose density departs from its model by a share, another in each hour.
+def with_air(given):
+    """The setup with the logarithm of the density over that of its model, and its waves over a turn, as constants."""
+    every = {**given.chosen.forces.definitions, **given.chosen.extra.definitions}
+    total = "true_air + true_cos*latitude_cos + true_sin*latitude_sin"
+    extra = given.chosen.extra.and_(Extra({**LATITUDE, **instead(every, "cd_a_m", f"(cd_a_m*exp({total}))")}))
+    roles = {**given.chosen.roles, **dict.fromkeys(TRUE, "estimated")}
+    values = {**given.chosen.values, **dict.fromkeys(TRUE, pz.Gaussian(0.0, 1.0))}
+    return renewed(given, given.measured, replace(given.chosen, roles=roles, values=values, extra=extra))
 
-    Density multiplies the coefficient of drag, whatever that is: the share is of the object's own, not of the usual one.
-    """
-    place = given.problem.model.names.index("cd_a_m_share")
-    out, x, t, own = [], first.copy(), float(times[0]), value_of(first[place])
-    for k, part in enumerate(share):
+
+def flown(given, first, times, logarithms):
+    """States (K, n) of an orbit through air whose density over that of its model has other logarithms in each hour."""
+    place = given.problem.model.names.index(TRUE[0])
+    out, x, t = [], first.copy(), float(times[0])
+    for k, one in enumerate(logarithms.tolist()):
         end = min(PIECE * (k + 1), float(times[-1]))
         inside = times[(times > t) & (times <= end)]
-        x[place] = share_of(own * max(1.0 + part, LEAST))
+        x[place] = one
         nodes = np.unique(np.concatenate([[t], inside, [end]]))
         states = follow(given.problem, nodes, x, given.chosen.max_step)[0]
         out.append(states[np.isin(nodes, inside if k else np.concatenate([times[:1], inside]))])
@@ -186,11 +195,12 @@ def flown(given, first, times, share):
 def predictions(kind, count, other=None, days=(1, 2, 3), first=0):
     """NEES per axis R, T, N (count, days, 3) of predictions, where the density of the truth varies, or is another model's.
 
-    The truth is drawn from what the determination believes before.  Errors are those along the curved orbit, on the axes where
+    The truth is drawn from what the determination believes before: the logarithm of the density is a Gauss-Markov process, with
+    waves over a turn where nothing is said of how drag varies.  Errors are those along the curved orbit, on the axes where
     the prediction stands, for which its covariance is: 40 km along the track are 120 m of the straight line's height.
     """
     given = begun(kind)
-    truth = given if other is None else begun(other)
+    truth, waves = with_air(given if other is None else begun(other)), given.chosen.air_varies is not None
     names, law = truth.problem.model.names, given.chosen.air_varies or AirVaries(0.32, 86400.0)
     place = names.index("cd_a_m_share")
     before, spread = truth.problem.mean[place], np.sqrt(truth.problem.covariance[place, place])
@@ -201,14 +211,19 @@ def predictions(kind, count, other=None, days=(1, 2, 3), first=0):
     for seed in range(first, first + count):
         rng = np.random.default_rng(seed)
         hours = int(times[-1] // PIECE) + 2
-        share, left = np.zeros(hours), np.exp(-PIECE / law.time)
-        share[0] = law.sigma * rng.standard_normal()
+        change, left = np.zeros(hours), np.exp(-PIECE / law.time)
+        change[0] = law.sigma * rng.standard_normal()
         for k in range(1, hours):
-            share[k] = left * share[k - 1] + law.sigma * np.sqrt(1 - left**2) * rng.standard_normal()
+            change[k] = left * change[k - 1] + law.sigma * np.sqrt(1 - left**2) * rng.standard_normal()
         start = truth.states[0].copy()
         start[:6] += np.repeat(kind.off, 3) * rng.standard_normal(6)
         start[place] = before + spread * rng.standard_normal()
-        states = flown(truth, start, times, share if other is None else 0.0 * share)
+        if waves:  # the density is estimated, and the coefficient log-normal
+            size = np.sqrt(np.log1p(spread**2))
+            start[place] = share_of(np.exp(size * (start[place] - before) / spread - 0.5 * size**2))
+        if waves and other is None:
+            start[[names.index(name) for name in TRUE[1:]]] = law.sigma * rng.standard_normal(2)
+        states = flown(truth, start, times, change - 0.5 * law.sigma**2 if other is None else 0.0 * change)
         z = predicted(truth.problem, prepare(truth.problem, truth.tracking), states[: len(rows)])
         z = z + kind.sigma * rng.standard_normal(z.shape)
         tracking = pz.Tracking(given.tracking.row_times, z, given.tracking.row_stations, epoch=given.tracking.epoch)

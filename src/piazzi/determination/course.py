@@ -16,10 +16,10 @@ import numpy as np
 
 from piazzi.determination.beliefs import beliefs, carried_to
 from piazzi.determination.centres import EARTH, Centre, centre_of
-from piazzi.determination.density import departed
+from piazzi.determination.density import Law, departed
 from piazzi.determination.guesses import CARTESIAN, SCHEMA, Guess, guess_of
 from piazzi.determination.motion import Extra, instead
-from piazzi.determination.orbit_forces import Chosen, chosen_forces
+from piazzi.determination.orbit_forces import AirVaries, Chosen, chosen_forces
 from piazzi.determination.physical import DENSITY, WAVES
 from piazzi.determination.sun_forces import forces_about_the_sun
 from piazzi.earth import EphemerisWarning, Epoch, Forces
@@ -37,6 +37,7 @@ from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 
 HDF5, JSON = b"\x89HDF", b"{"
+MEAN = f"{DENSITY}mean"  # of its logarithm
 MEMORY = f"{DENSITY}time"  # over which what density departs by goes back to zero, s
 OLD = 10.0  # days from two-line elements, from which on it is said
 Beliefs = Callable[[Array], tuple[Array, Array | None]]
@@ -178,13 +179,13 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
         raise ValueError(f"{source}: the determination has no finite covariance")
     chosen = _chosen(_forces_of(said, source, guess.about), guess.state, name, guess.about)
     varies, air = chosen.air_varies, _estimated_air(names, dates, before)
-    sigma = 0.0 if varies is None or "cd_a_m" not in names else varies.sigma * float(mean[names.index("cd_a_m")])
     if varies is not None and air:
         mean, P = _with_density(dates, names, mean, P)
-        chosen, sigma = _with_departure(chosen, air, varies.time), float(before["cd_a_m"][0] * before[air[0]][1])
+        varies = varies._replace(sigma=float(before[air[0]][1]))
+        chosen = _with_departure(replace(chosen, air_varies=varies), air, varies)
     own = [p for p in (*chosen.forces.parameters, *air) if p in before and p in names]
     roles = {p: role for p, role in chosen.roles.items() if p in own} | dict.fromkeys(own, "estimated")
-    roles |= dict.fromkeys([MEMORY] if MEMORY in chosen.values else [], "fixed")
+    roles |= dict.fromkeys([name for name in (MEMORY, MEAN) if name in chosen.values], "fixed")
     values: dict[str, Any] = {**_numbers(chosen)}
     values |= {p: Gaussian(mean[names.index(p)], max(P[names.index(p), names.index(p)], 1e-300)) for p in own}
     problem = _problem(chosen, roles, values, guess.epoch, guess.state, np.zeros((6, 6)), name)
@@ -196,7 +197,7 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
     assumed = tuple(str(text) for text in facts.get("assumed", ()))
     carry = _carrying(problem, chosen.max_step, first, moved)
     found = Course(name, problem, carry, source, assumed, centre=centre_of(guess.about))
-    return _departing(found, chosen, first, sigma, behind, MEMORY in chosen.values)
+    return _departing(found, chosen, first, moved, behind, MEMORY in chosen.values)
 
 
 def _chosen(forces: Any, state: Array, name: str, about: str) -> Chosen:
@@ -212,39 +213,32 @@ def _estimated_air(names: Sequence[str], dates: Sequence[float], known: Mapping[
 
 
 def _with_density(dates: Sequence[float], names: Sequence[str], mean: Array, P: Array) -> tuple[Array, Array]:
-    """Means and covariance with what density departs by in units of the coefficient of drag (m2/kg).
-
-    At the place of its last node is what it is at the epoch, from which on `dates` (s) are those of all nodes.
-    """
+    """Means and covariance with the density at the epoch, from which on `dates` (s) of nodes count, as the last node."""
     nodes = [names.index(f"{DENSITY}{k}") for k in range(1, len(dates) + 1)]
-    drag, own = names.index("cd_a_m"), [nodes[-1], *(names.index(wave) for wave in WAVES if wave in names)]
-    shares = np.eye(len(names))
-    shares[nodes[-1], nodes] = [np.interp(0.0, dates, row) for row in np.eye(len(dates))]
-    J, values = shares.copy(), mean.copy()
-    J[own] *= mean[drag]
-    J[own, drag] = shares[own] @ mean
-    values[own] = J[own, drag] * mean[drag]
-    return values, J @ P @ J.T
+    J = np.eye(len(names))
+    J[nodes[-1], nodes] = [np.interp(0.0, dates, row) for row in np.eye(len(dates))]
+    return J @ mean, J @ P @ J.T
 
 
-def _with_departure(chosen: Chosen, own: Sequence[str], time: float) -> Chosen:
-    """The forces with those beside the coefficient of drag: the first goes back to zero, over that time, away from t = 0."""
-    waves = (f"{wave}*{wave.replace(DENSITY, 'latitude_')}" for wave in own[1:])
-    total = " + ".join(("cd_a_m", f"{own[0]}*exp(-abs(t)/{MEMORY})", *waves))
-    text = {**LATITUDE, **instead(chosen.forces.definitions, "cd_a_m", f"max({total}, 0)")}
-    return replace(chosen, extra=Extra(text), values={**chosen.values, MEMORY: time})
+def _with_departure(chosen: Chosen, own: Sequence[str], air: AirVaries) -> Chosen:
+    """The forces with a density of those logarithms, whose mean goes back to that of the model away from t = 0."""
+    total = [f"{MEMORY}_left*({own[0]} + {MEAN}*({MEMORY}_left - 1))"]
+    total += [f"{wave}*{wave.replace(DENSITY, 'latitude_')}" for wave in own[1:]]
+    drag = instead(chosen.forces.definitions, "cd_a_m", f"(cd_a_m*exp({' + '.join(total)}))")
+    text = {**LATITUDE, f"{MEMORY}_left": f"exp(-abs(t)/{MEMORY})", **drag}
+    return replace(chosen, extra=Extra(text), values={**chosen.values, MEMORY: air.time, MEAN: -0.5 * air.sigma**2})
 
 
-def _departing(found: Course, chosen: Chosen, first: Array, sigma: float, behind: float, known: bool) -> Course:
-    """The orbit with covariances that have in them how density departs, with its steady `sigma` in the coefficient of drag.
+def _departing(found: Course, chosen: Chosen, first: Array, covariance: Array, behind: float, known: bool) -> Course:
+    """The orbit with covariances that have in them how density departs; its first state and the covariance of that.
 
     Where it was estimated, `known`, it departs from that at the epoch; else `behind` the last measurement (s).
     """
     air, names, problem = chosen.air_varies, found.problem.model.names, found.problem
     if air is None or "cd_a_m" not in names:
         return found
-    place, law = names.index("cd_a_m"), (sigma, air.time, 0.0 if known else sigma)
-    there = first
+    place, law, there = names.index("cd_a_m"), Law(air.sigma, air.time, known), first
+    size = float(np.hypot(first[place], np.sqrt(covariance[place, place])))
     if behind > 0.0:
         there = carried_to(problem, chosen.max_step, 0.0, first, np.eye(len(first)), np.array([behind]))[0][0]
 
@@ -252,7 +246,7 @@ def _departing(found: Course, chosen: Chosen, first: Array, sigma: float, behind
         x, P = found.beliefs(t)
         for side in (t > behind, (t < 0.0) & known):
             if P is not None and side.any():
-                P[side] += departed(problem, chosen.max_step, behind, there, place, law, t[side])
+                P[side] += departed(problem, chosen.max_step, behind, there, (place, size), law, t[side])
         return x, P
 
     said = ("the density of the air goes from what was estimated at the epoch back to its model, and departs",) if known else ()

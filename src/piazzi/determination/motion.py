@@ -120,11 +120,11 @@ def by_parts(name: str, one: Asked, before: Gaussian, first: float, last: float,
 def process(
     name: str, one: Asked, sigma: float, relative: bool, unit: str, definitions: Definitions, numbers: Numbers
 ) -> Extra:
-    """A parameter with a Gauss-Markov process beside it, which is a share of it where it is `relative`."""
+    """A parameter with a Gauss-Markov process beside it, which is the logarithm of a factor where it is `relative`."""
     state, tau = f"{name}_change", f"{name}_tau"
     numbers.roles[tau], numbers.values[tau] = "fixed", one.what.period
-    share = "share by which {} differs" if relative else "{} beside its constant"
-    label = Label(one.what.label, f"{share.format(words_of(name))}, correlated over {one.what.per[1:] if one.what.per else ''}")
+    what = "logarithm of a factor of {}" if relative else "{} beside its constant"
+    label = Label(one.what.label, f"{what.format(words_of(name))}, correlated over {one.what.per[1:] if one.what.per else ''}")
     own = Process(state, tau, one.what.period, sigma, "" if relative else unit, label)
     text = {} if relative else instead(definitions, name, f"({name} + {state})")  # coefficients have all that is said of them
     return Extra(text, processes=(own,), labels={state: label})

@@ -2,8 +2,9 @@
 
 Of a coefficient of sunlight or of air its share s of a usual value is estimated.  The value is that times
 (s + sqrt(s^2 + 4 a)) / 2 with a = 0.01: above a fifth of the usual it is s to some percent, so that estimators which linearise
-once see a straight line, and it comes near to zero without ever being there, whatever they make of s.  What density departs
-by is added to s.
+once see a straight line, and it comes near to zero without ever being there, whatever they make of s.  What varies over time is
+the logarithm of a factor of it: so is the density of the air, that over the density of its model.  Where that is estimated the
+logarithm of the coefficient of drag is too: measurements tell their sum, so that what is known of both then is Gaussian.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 
 POSITIVE = ("cr_a_m", "cd_a_m")
-SHARE, AIR, DENSITY = "_share", "air_", "density_"
+SHARE, LOGARITHM, AIR, DENSITY = "_share", "_log", "air_", "density_"
 BEND = 0.01
-DRAG, WAVES = "cd_a_m_share", ("density_cos", "density_sin")
+DRAG, DRAG_LOGARITHM, WAVES = "cd_a_m_share", "cd_a_m_log", ("density_cos", "density_sin")
 USUAL = 1.0 - BEND  # the share of the usual value itself
 
 
@@ -39,6 +40,17 @@ def share_of(value: Any) -> Any:
 def slope_of(share: Any) -> Any:
     """The derivative of `value_of`."""
     return 0.5 * (1.0 + share / np.sqrt(share**2 + 4.0 * BEND))
+
+
+def is_coefficient(name: str) -> bool:
+    """Whether a name is that of what is estimated of a coefficient."""
+    return name.startswith(POSITIVE) and name.endswith((SHARE, LOGARITHM))
+
+
+def worth(name: str, x: float) -> tuple[float, float]:
+    """The coefficient in units of the usual one, of a share or a logarithm as the name says, and its derivative."""
+    value, slope = (np.exp(x), np.exp(x)) if name.endswith(LOGARITHM) else (value_of(x), slope_of(x))
+    return float(value), float(slope)
 
 
 def by_shares(numbers: Numbers, extra: Extra, definitions: Mapping[str, str]) -> Extra:
@@ -59,14 +71,13 @@ def by_shares(numbers: Numbers, extra: Extra, definitions: Mapping[str, str]) ->
             numbers.roles[name + SHARE], numbers.values[name + SHARE] = role, Gaussian(USUAL, (spread / mean) ** 2)
             labels[name + SHARE] = extra.labels.get(name) or Label(name, words_of(name))
             total = name + SHARE
-        text = f"({name}*({name}_total + sqrt({name}_total**2 + {4.0 * BEND!r}))/2)"
-        changed |= instead({**definitions, **changed}, name, text)
-        changed |= {f"{name}_total": f"{total} + {name}_change" if varies else total}
+        text = f"{name}*({total} + sqrt({total}**2 + {4.0 * BEND!r}))/2"
+        changed |= instead({**definitions, **changed}, name, f"({text}*exp({name}_change))" if varies else f"({text})")
     return Extra(changed, labels=labels)
 
 
 def air_of(problem: Problem) -> tuple[list[int], Array]:
-    """Where what drives the density stands, and the matrix (k, k) that makes its logarithm at the nodes of it."""
+    """Where what drives the density stands, and the matrix (k, k) that makes its logarithm at its nodes, about its mean."""
     names = problem.model.names
     count = sum(is_node(name) for name in names)
     where = [names.index(f"{AIR}{k}") for k in range(1, count + 1)]
@@ -94,7 +105,7 @@ def said_name(name: str) -> str:
     """The name by which results have a value that is estimated."""
     if is_node(name):
         return DENSITY + name.removeprefix(AIR)
-    return name.removesuffix(SHARE) if name.startswith(POSITIVE) else name
+    return name.removesuffix(SHARE).removesuffix(LOGARITHM) if name.startswith(POSITIVE) else name
 
 
 def result_name(labels: Mapping[str, Label], name: str) -> str:
@@ -107,17 +118,12 @@ def said(problem: Problem, mean: Array) -> tuple[Array, Array]:
     names = problem.model.names
     values, J = mean.copy(), np.eye(len(mean))
     where, root = air_of(problem)
-    values[where], J[np.ix_(where, where)] = root @ mean[where], root
-    where += [names.index(name) for name in WAVES if name in names]
+    if where:
+        values[where], J[np.ix_(where, where)] = root @ mean[where] + float(problem.parameters[f"{AIR}mean"]), root
     for i, name in enumerate(names):
-        if not (name.startswith(POSITIVE) and name.endswith(SHARE)):
-            continue
-        size, value, slope = float(problem.parameters[said_name(name)]), value_of(mean[i]), slope_of(mean[i])
-        values[i], J[i, i] = size * value, size * slope
-        if name == DRAG:  # density as a share of what it is with this coefficient
-            J[where, i] = -values[where] * slope / value**2
-            values[where] /= value
-            J[np.ix_(where, where)] /= value
+        if is_coefficient(name):
+            size = float(problem.parameters[said_name(name)])
+            values[i], J[i, i] = (size * one for one in worth(name, mean[i]))
     return values, J
 
 
@@ -132,7 +138,8 @@ def believed(problem: Problem, name: str) -> tuple[float, float]:
     if said_name(name) == name:
         return value, sigma
     size = float(problem.parameters[said_name(name)])
-    return size * float(value_of(value)), size * float(slope_of(value)) * sigma
+    of, slope = worth(name, value)
+    return size * of, size * slope * sigma
 
 
 def at_rest(problem: Problem, names: Sequence[str]) -> Problem:

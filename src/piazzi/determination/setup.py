@@ -16,16 +16,14 @@ from piazzi.determination.motion import Extra, process_noise, with_processes
 from piazzi.determination.orbit_forces import Chosen
 from piazzi.determination.physical import (
     AIR,
-    DRAG,
-    POSITIVE,
-    SHARE,
+    LOGARITHM,
     USUAL,
-    WAVES,
     at_rest,
+    is_coefficient,
     is_node,
     result_name,
     said_name,
-    slope_of,
+    worth,
 )
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import Label
@@ -181,15 +179,13 @@ def _known(
     where = [known[names[i]] for i in own]
     J, values = np.eye(len(own)), earlier.mean[where]
     for k, i in enumerate(own):
-        if names[i].startswith(POSITIVE) and names[i].endswith(SHARE):
+        if is_coefficient(names[i]):
             parameters[said_name(names[i])] = size = float(values[k])
-            J[k, k], values[k] = 1.0 / (size * slope_of(USUAL)), USUAL
-    air = [k for k, i in enumerate(own) if is_node(names[i]) or names[i] in WAVES]
-    for k in air:  # shares of what the coefficient makes
-        if DRAG in known and DRAG in names:
-            J[k, own.index(names.index(DRAG))] = values[k] / parameters[said_name(DRAG)]
-    for k in (k for k in air if is_node(names[own[k]])):
-        values[k], J[k] = values[k] / parameters[f"{AIR}sigma"], J[k] / parameters[f"{AIR}sigma"]
+            values[k] = 0.0 if names[i].endswith(LOGARITHM) else USUAL
+            J[k, k] = 1.0 / (size * worth(names[i], values[k])[1])
+        if is_node(names[i]):
+            sigma = parameters[f"{AIR}sigma"]
+            J[k, k], values[k] = 1.0 / sigma, (values[k] - parameters[f"{AIR}mean"]) / sigma
     P[own, :] = P[:, own] = 0.0
     mean[own] = values
     P[np.ix_(own, own)] = J @ earlier.covariance[np.ix_(where, where)] @ J.T
