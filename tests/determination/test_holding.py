@@ -11,7 +11,7 @@ from piazzi.determination.approach import approached
 from piazzi.determination.case import Case
 from piazzi.determination.determining import prepared, solved
 from piazzi.determination.fit import estimate, estimators
-from piazzi.determination.holding import check, held
+from piazzi.determination.holding import _by_steps, check, held
 from piazzi.determination.honesty import unseen
 from piazzi.determination.passes import passes
 from piazzi.determination.sentence import Sentence
@@ -114,6 +114,18 @@ def test_predictions_are_those_of_a_fit_without_the_pass(given):
     without = estimate(one, estimators(("graph",))["graph"], rest)
     computed = predicted(one.problem, prepare(one.problem, one.tracking), without.mean)
     assert left.residual == pytest.approx(one.tracking.values[left.rows] - computed[left.rows], abs=1e-4)
+
+
+def test_passes_that_are_left_out_in_turn_are_predicted_as_each_by_itself(given):
+    """The others need no orbit of their own where the farthest step was straight, to a tenth of a sigma of the prediction."""
+    one = approached(noisy(given, 4))
+    full = solved(one, estimators(("graph",)), case=Case(hold="passes"))
+    found = full.held
+    for group in found.groups:
+        (alone,) = _by_steps(one, full.estimate, full.analysis, full.keep, [group.rows])
+        assert np.abs(alone.residual - group.residual).max() < 0.1 * SIGMA
+        assert alone.squares == pytest.approx(group.squares, rel=1e-2)
+        assert (alone.rows == group.rows).all()
 
 
 def test_squares_are_honest_over_seeds(given):

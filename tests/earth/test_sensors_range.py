@@ -9,7 +9,10 @@ import piazzi as pz
 from piazzi import earth
 from piazzi.earth import sensors
 from piazzi.earth.sensors import light
+from piazzi.model.functions import STATION
+from piazzi.model.values import with_values
 from piazzi.outside.table import Table
+from piazzi.problem import evaluation
 from tests.references.signals import EPOCH, HERSTMONCEUX, YARRAGADEE, C, Site, T, Trajectory, legs, orbit, problem, slopes
 
 ORBITS = {"LEO": 1e-6, "GEO": 1e-6, "Moon": 1e-5}
@@ -61,6 +64,20 @@ def test_passes_of_a_station_are_checked_at_the_door_as_one(monkeypatch):
     once = len(looked)
     replace(one, stations=[replace(one.stations[0], name=f"pass {i}") for i in range(5)])
     assert len(looked) == 2 * once > 0
+
+
+def test_forces_are_worked_out_once_for_the_check_of_a_light_time_with_the_same_values(monkeypatch):
+    p = problem(*(sensors.range(path, name=path) for path in light.PATHS[:2]))
+    numbers, functions = {**dict(zip(p.model.names, orbit("LEO"), strict=True)), **p.parameters, "t": T}, p.functions
+    values = with_values(numbers, p.model.definitions, functions=functions, model=p.model)
+    still, known = evaluation._with_rates(p.model, values)
+    assert still is not p.model
+    for station in p.stations:
+        about = {"functions": {**functions, STATION: station.place}}
+        layer, own = p.model.sensor(station.sensor).definitions, dict(station.numbers)
+        anew = with_values(values | own, layer, model=p.model, **about)
+        assert anew.items() <= with_values(known | own, layer, model=still, **about).items()
+        assert len(anew) > len(values | own)
 
 
 def test_light_time_goes_to_zero_as_light_gets_faster(monkeypatch):

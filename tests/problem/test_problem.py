@@ -314,3 +314,22 @@ def test_kernels_that_are_loaded_stay_loaded_however_many_kinds_of_problems_come
         kind(i)
     assert [kind(i).spec("transition", "rates") for i in range(1, 4)] == wanted
     assert len(kinds) <= MOST_KINDS + 1
+
+
+def test_another_prior_leaves_what_follows_of_the_new_one():
+    old, new = problem(), pz.Gaussian([2.0, -0.5], 4.0 * np.eye(2))
+    old.prior_bundle, old.given_bundle  # noqa: B018  # worked out, so that they could stay
+    found, made = (
+        old.with_prior(new, 3.0),
+        pz.Problem(**{f: getattr(old, f) for f in old.__dataclass_fields__} | {"prior": new, "prior_time": 3.0}),
+    )
+    for name in ("mean", "covariance", "given"):
+        assert_array_equal(getattr(found, name), getattr(made, name))
+    assert_array_equal(found.prior_bundle.mean, made.mean)
+    assert found.prior_start(np.array([7.0])) == 3.0
+    assert found.specs is old.specs
+    assert (old.prior_time, old.mean[0]) == (None, 1.0)
+    with pytest.raises(ValueError, match="prior mean has 1 values"):
+        old.with_prior(pz.Gaussian([1.0], np.eye(1)), None)
+    with pytest.raises(ValueError, match="prior_time is nan"):
+        old.with_prior(new, NAN)

@@ -1,19 +1,21 @@
 """From a guess to near the answer: damped least squares in elements at the date of the guess, over a span that grows.
 
 An orbit that is a little wrong at its date is very wrong days later.  Corrected at the date of the guess, and in elements, it
-bends less than anywhere else; and measurements that are near that date say in which turn the others are.
+bends less than anywhere else; and measurements that are near that date say in which turn the others are.  Nobody looks at the
+others before.
 
 What is found only says where estimators begin: their prior is about it, and much wider than what the measurements leave.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, pi
 
 import numpy as np
 
-from piazzi.determination.analysis import analysed
+from piazzi.determination.analysis import Analysis, analysed
+from piazzi.determination.extending import part
 from piazzi.determination.setup import Setup, follow, scale_of, with_prior
 from piazzi.determination.sweep import swept
 from piazzi.evaluate.information import factor
@@ -34,13 +36,18 @@ SPREAD = 2.5  # times the median residual, from which on a row counts less and l
 class Place:
     """A trial: the state and constants at the date of the guess, and all that follows from it.
 
-    `rows` are the derivatives of the whitened residuals by elements and constants.
+    `rows` are the derivatives of the whitened residuals by elements and constants; those of `analysis`, by the first state.
     """
 
     first: Array
     states: Array
-    whitened: Array
+    analysis: Analysis
     rows: Array
+
+    @property
+    def whitened(self) -> Array:
+        """Residuals (J, m) in units of the noise."""
+        return self.analysis.whitened
 
 
 def approached(given: Setup) -> Setup:
@@ -48,12 +55,10 @@ def approached(given: Setup) -> Setup:
 
     An orbit that was known before stays: it is the prior.
     """
-    start = _start(given)
-    if start is None:
+    if given.before is not None:
         return given
-    begun, first, here = start
-    unit = scale_of(given, first)
-    before = first
+    begun, before = _start(given)
+    unit, first = scale_of(given, before), before
     away = np.abs(given.tracking.row_times - begun)
     there = np.isfinite(given.tracking.values)
     half = pi / given.measured.centre.turning(first[:3], first[3:6])
@@ -61,32 +66,35 @@ def approached(given: Setup) -> Setup:
         rows = away <= half
         whole = bool(rows.all())
         if there[rows].sum() >= ENOUGH or whole:
-            here = _fitted(given, begun, here, rows, unit, before, LONG if whole else SHORT)
-        if whole:
-            return with_prior(given, here.states, _wide(given, here))
+            near = given if whole else replace(given, tracking=part(given.tracking, rows), rows=given.rows[rows])
+            here = _place(near, begun, first)
+            if here is None:
+                return given
+            here = _fitted(near, begun, here, unit, before, LONG if whole else SHORT)
+            if whole:
+                return with_prior(given, here.states, _wide(given, here))
+            first = here.first
         half *= 2.0
 
 
 def refined(given: Setup) -> Setup:
     """The same of a set-up that is near but for unknowns that it has got since: over all measurements at once."""
-    start = _start(given)
-    if start is None:
+    if given.before is not None:
         return given
-    begun, first, here = start
+    begun, first = _start(given)
+    here = _place(given, begun, first)
+    if here is None:
+        return given
     before = np.concatenate([first[:6], given.problem.mean[6:]])
-    here = _fitted(given, begun, here, np.ones(len(given.rows), dtype=np.bool_), scale_of(given, first), before, LONG)
+    here = _fitted(given, begun, here, scale_of(given, first), before, LONG)
     return with_prior(given, here.states, _wide(given, here))
 
 
-def _start(given: Setup) -> tuple[float, Array, Place] | None:
-    """When to begin, and with which state and place; None where the orbit was known before, or leads nowhere."""
-    if given.before is not None:
-        return None
+def _start(given: Setup) -> tuple[float, Array]:
+    """When to begin, and with which state."""
     times = given.tracking.times
     begun = float(np.clip(given.guess.epoch - given.measured.epoch, times[0], times[-1]))
-    first = _state_at(given, begun)
-    here = _place(given, begun, first)
-    return None if here is None else (begun, first, here)
+    return begun, _state_at(given, begun)
 
 
 def _wide(given: Setup, here: Place) -> Array:
@@ -98,7 +106,7 @@ def _wide(given: Setup, here: Place) -> Array:
     unit = scale_of(given, here.states[0])
     keep = np.ones(len(given.rows), dtype=np.bool_)
     s = len(given.problem.model.states)
-    everything = analysed(given, here.states).information(keep, unit)
+    everything = here.analysis.information(keep, unit)
     alone = factor(np.roll(everything, -s, axis=1))[-s:, -s:]
     root = factor(np.vstack([alone / WIDER, np.eye(s)]))
     inverse = np.linalg.solve(root, np.eye(s))
@@ -118,7 +126,7 @@ def _place(given: Setup, begun: float, first: Array) -> Place | None:
     """All that follows from a state; None where the orbit ends, or measurements have no prediction."""
     times, step = given.tracking.times, ROUGHLY * given.chosen.max_step
     try:
-        gap = begun - float(times[0])
+        gap = abs(begun - float(times[0]))
         nodes = np.linspace(begun, float(times[0]), max(ceil(gap / step), 1) + 1) if gap > 0 else np.array([begun])
         back, Phi = follow(given.problem, nodes, first, step)
         states, derivatives = swept(given.problem, times, back[-1], step)
@@ -131,7 +139,7 @@ def _place(given: Setup, begun: float, first: Array) -> Place | None:
     there = np.isfinite(given.tracking.values)
     if not (np.isfinite(found.whitened[there]).all() and np.isfinite(found.rows[there]).all()):
         return None
-    return Place(first, states, found.whitened, found.rows @ change)
+    return Place(first, states, found, found.rows @ change)
 
 
 def _moved(first: Array, step: Array, mu: float) -> Array:
@@ -142,16 +150,16 @@ def _moved(first: Array, step: Array, mu: float) -> Array:
     return np.concatenate([r, v, first[6:] + step[6:]])
 
 
-def _fitted(given: Setup, begun: float, here: Place, rows: Array, unit: Array, before: Array, steps: int) -> Place:
-    """The nearest minimum from the rows (J,), by Levenberg and Marquardt's steps, with a loss that outliers do not rule."""
+def _fitted(given: Setup, begun: float, here: Place, unit: Array, before: Array, steps: int) -> Place:
+    """The nearest minimum, by Levenberg and Marquardt's steps, with a loss that outliers do not rule."""
     damping = 1e-6
     for _ in range(steps):
-        scale = _scale(here.whitened[rows])
-        cost = _cost(given, here, rows, scale, unit, before)
+        scale = _scale(here.whitened)
+        cost = _cost(here, scale, unit, before)
         better = None
         while better is None and damping < LARGEST:
-            trial = _tried(given, begun, here, rows, unit, before, scale, damping)
-            new = np.inf if trial is None else _cost(given, trial, rows, scale, unit, before)
+            trial = _tried(given, begun, here, unit, before, scale, damping)
+            new = np.inf if trial is None else _cost(trial, scale, unit, before)
             if trial is not None and new < cost:
                 better = trial
                 damping = max(damping / 30.0, LEAST)
@@ -165,10 +173,8 @@ def _fitted(given: Setup, begun: float, here: Place, rows: Array, unit: Array, b
     return here
 
 
-def _tried(
-    given: Setup, begun: float, here: Place, rows: Array, unit: Array, before: Array, scale: float, damping: float
-) -> Place | None:
-    w, J = here.whitened[rows].reshape(-1), here.rows[rows].reshape(-1, len(unit))
+def _tried(given: Setup, begun: float, here: Place, unit: Array, before: Array, scale: float, damping: float) -> Place | None:
+    w, J = here.whitened.reshape(-1), here.rows.reshape(-1, len(unit))
     there = np.isfinite(w)
     weight = 1.0 / np.sqrt(1.0 + (w[there] / scale) ** 2)
     mu = given.measured.centre.mu
@@ -199,8 +205,7 @@ def _scale(whitened: Array) -> float:
     return SPREAD * max(1.0, 1.4826 * float(np.median(known))) if known.size else SPREAD
 
 
-def _cost(given: Setup, place: Place, rows: Array, scale: float, unit: Array, before: Array) -> float:
+def _cost(place: Place, scale: float, unit: Array, before: Array) -> float:
     """Cauchy's, and that of the prior."""
-    w = place.whitened[rows]
-    w = w[np.isfinite(w)]
+    w = place.whitened[np.isfinite(place.whitened)]
     return float(scale**2 * np.log1p((w / scale) ** 2).sum() + (((place.first - before) / unit) ** 2).sum())

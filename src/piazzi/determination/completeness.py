@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.analysis import Analysis, of_orbit
-from piazzi.determination.setup import Setup, follow, scale_of
+from piazzi.determination.setup import Setup, scale_of
 from piazzi.determination.sweep import swept
 from piazzi.earth import Forces, Gravity
 from piazzi.earth.defaults import AIR_BELOW, DRAGGED, REFLECTED, lowest_height
@@ -24,7 +24,6 @@ from piazzi.expressions import evaluate_arrays
 from piazzi.model.definitions import needed
 from piazzi.model.values import with_arrays
 from piazzi.problem.checks import Array
-from piazzi.problem.dense import products
 from piazzi.problem.inputs import prepare
 
 LARGEST = 120  # degree of the fields of the package
@@ -123,8 +122,8 @@ def carrying(given: Setup, states: Array) -> tuple[Array, Array, Array]:
     t = np.linspace(times[0], times[-1], count + 1)
     if not t[-1] > t[0]:
         return t, states[:1], np.zeros((1, 6, 3))
-    path, Phi = follow(given.problem, t, states[0], given.chosen.max_step)
-    back = np.linalg.solve(products(Phi)[:, :6, :6], np.eye(6)[:, 3:])
+    path, derivatives = swept(given.problem, t, states[0], given.chosen.max_step)
+    back = np.linalg.solve(derivatives[:, :6, :6], np.eye(6)[:, 3:])
     return t, path, back
 
 

@@ -7,7 +7,7 @@ reaches as far as the sigma of its mean motion leaves no doubt of that.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -151,7 +151,7 @@ def _fits(problem: Problem, tracking: Tracking, keep: Array, starts: Sequence[Ar
     few = part(tracking, keep)
     for start in starts:
         sigma = WIDE * np.repeat([np.linalg.norm(start[:3]), np.linalg.norm(start[3:6])], 3)
-        posed = replace(problem, prior=Gaussian(start[:6], np.diag(sigma**2)), prior_time=float(times.min()))
+        posed = problem.with_prior(Gaussian(start[:6], np.diag(sigma**2)), float(times.min()))
         solver = BatchLeastSquares(start=start, max_iterations=30, tolerance=NEAR, graph=False)
         try:
             estimate = solver.estimate(posed, few)

@@ -6,7 +6,7 @@ where it ends as long as that is another place.  With process noise the estimato
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -112,18 +112,20 @@ def held(given: Setup, estimator: Estimator, answer: Estimate, analysis: Analysi
     how : "passes", each in turn; "last"; or a share, the last ones
     """
     groups = _groups(given, keep, how)
-    found: list[Unseen] = []
-    for rows in groups:
-        rest = keep.copy()
-        rest[rows] = False
-        one = (
-            _by_steps(given, answer, analysis, rest, rows)
-            if given.problem.is_noise_free
-            else _by_estimator(given, estimator, answer, rest, rows)
-        )
-        if one is not None:
-            found.append(one)
-    return Held(how if isinstance(how, str) else f"{how:.3g}", tuple(found), len(groups) - len(found))
+    tried: Iterable[Unseen | None]
+    if given.problem.is_noise_free:
+        tried = _by_steps(given, answer, analysis, keep, groups)
+    else:
+        tried = (_by_estimator(given, estimator, answer, without(keep, rows), rows) for rows in groups)
+    found = tuple(one for one in tried if one is not None)
+    return Held(how if isinstance(how, str) else f"{how:.3g}", found, len(groups) - len(found))
+
+
+def without(keep: Array, rows: Array) -> Array:
+    """The rows to keep (J,) but for a group of them."""
+    rest = keep.copy()
+    rest[rows] = False
+    return rest
 
 
 def unasked(given: Setup, keep: Array) -> str | float | None:
@@ -142,25 +144,61 @@ def _groups(given: Setup, keep: Array, how: str | float) -> Sequence[Array]:
     return [used[len(used) - max(round(float(how) * len(used)), 1) :]]
 
 
-def _by_steps(given: Setup, answer: Estimate, analysis: Analysis, rest: Array, rows: Array) -> Unseen | None:
-    """From the whole solution by steps of Gauss and Newton; None where the rest determines nothing."""
-    first, here = answer.mean[0].copy(), analysis
-    unit = scale_of(given, first)
-    for left in reversed(range(ROUNDS)):
-        root = here.information(rest, unit)
-        if not singular(of_orbit(root))[0][-1] > 1.0:
-            return None
-        step, length = here.toward(rest, root, unit)
-        if length <= NEAR or not left:
-            break
-        first = first + unit * step
-        try:
-            states, derivatives = swept(given.problem, given.tracking.times, first, given.chosen.max_step)
-        except ValueError:
-            return None
-        here = analysed(given, states, derivatives)
-        if not np.isfinite(here.whitened[rows][np.isfinite(given.tracking.values[rows])]).all():
-            return None
+def _by_steps(given: Setup, answer: Estimate, analysis: Analysis, keep: Array, groups: Sequence[Array]) -> list[Unseen | None]:
+    """From the whole solution by steps of Gauss and Newton, for each group; None where the rest determines nothing.
+
+    What a step leaves grows with its square.  So the group goes first whose step is the longest, in sigma of the whole
+    solution, and from one on that leaves next to nothing there the others are taken by their steps as they are.  Their own
+    sigma is larger still.
+    """
+    unit = scale_of(given, answer.mean[0])
+    whole = analysis.information(keep, unit)
+    firsts: dict[int, _Step] = {}
+    for i, rows in enumerate(groups):
+        if (step := _stepped(analysis, without(keep, rows), unit)) is not None:
+            firsts[i] = step
+    found: list[Unseen | None] = [None] * len(groups)
+    straight = False
+    for i in sorted(firsts, key=lambda i: -float(np.linalg.norm(whole @ firsts[i].step))):
+        rows, step, first = groups[i], firsts[i], answer.mean[0].copy()
+        for left in reversed(range(ROUNDS)):
+            if straight or step.length <= NEAR or not left:
+                found[i] = _scored(given, step, rows, unit)
+                break
+            first = first + unit * step.step
+            try:
+                states, derivatives = swept(given.problem, given.tracking.times, first, given.chosen.max_step)
+            except ValueError:
+                break
+            here = analysed(given, states, derivatives)
+            if not np.isfinite(here.whitened[rows][np.isfinite(given.tracking.values[rows])]).all():
+                break
+            again = _stepped(here, without(keep, rows), unit)
+            if again is None:
+                break
+            step, straight = again, left == ROUNDS - 1 and float(np.linalg.norm(whole @ again.step)) <= NEAR
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """What a solution leaves, and the step from there to that of the other rows: in units of the state, its length in sigma."""
+
+    here: Analysis
+    root: Array
+    step: Array
+    length: float
+
+
+def _stepped(here: Analysis, rest: Array, unit: Array) -> _Step | None:
+    """None where the rest determines nothing."""
+    root = here.information(rest, unit)
+    return _Step(here, root, *here.toward(rest, root, unit)) if singular(of_orbit(root))[0][-1] > 1.0 else None
+
+
+def _scored(given: Setup, at: _Step, rows: Array, unit: Array) -> Unseen:
+    """The rows as they are predicted after the step."""
+    here, root, step = at.here, at.root, at.step
     own = np.nan_to_num(here.rows[rows]) * unit
     off = here.whitened[rows] - own @ step
     H = np.linalg.solve(root.T, own.reshape(-1, len(unit)).T).T

@@ -33,6 +33,7 @@ from piazzi.kernels import RungeKutta8
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.arcs import Steps, arc
 from piazzi.problem.checks import Array
+from piazzi.problem.dense import dense_grid, on_dense_grid
 from piazzi.problem.manoeuvres import SAME
 from piazzi.text import brief
 
@@ -121,7 +122,7 @@ def setup(
     states = _followed(problem, start, guess.epoch - measured.epoch, times, chosen.max_step)
     if earlier is None:
         mean = states[0, : len(problem.model.states)]
-        problem = replace(problem, prior=_prior(mean, chosen.extra), prior_time=begin)
+        problem = problem.with_prior(_prior(mean, chosen.extra), begin)
     said = tuple(dict.fromkeys(assumed))
     return Setup(measured, chosen, guess, problem, tracking, rows, states, solution, said, earlier, before)
 
@@ -147,7 +148,7 @@ def renewed(given: Setup, measured: Measured, chosen: Chosen) -> Setup:
     begin, old = float(given.problem.prior_time or 0.0), given.problem
     problem = _begun(problem, begin)
     if given.earlier is None:
-        problem = replace(problem, prior=old.prior, prior_time=begin)
+        problem = problem.with_prior(old.prior, begin)
     else:
         problem, before = _known(problem, given.earlier, labels_of(measured, chosen), begin, float(given.tracking.times[0]))
     place = {name: i for i, name in enumerate(old.model.names)}
@@ -160,7 +161,8 @@ def renewed(given: Setup, measured: Measured, chosen: Chosen) -> Setup:
 
 def _begun(problem: Problem, t: float) -> Problem:
     """The problem with those manoeuvres that are behind its prior."""
-    return replace(problem, manoeuvres=[m for m in problem.manoeuvres if m.time > t + SAME * max(abs(t), 1.0)])
+    left = [m for m in problem.manoeuvres if m.time > t + SAME * max(abs(t), 1.0)]
+    return problem if len(left) == len(problem.manoeuvres) else replace(problem, manoeuvres=left)
 
 
 def _known(
@@ -198,7 +200,7 @@ def with_prior(given: Setup, states: Array, covariance: Array) -> Setup:
     """The same with states (K, n) to begin from, and a prior about the first of them of this covariance."""
     count = len(given.problem.model.states)
     prior = Gaussian(states[0, :count], covariance[:count, :count])
-    return replace(given, problem=replace(given.problem, prior=prior), states=states)
+    return replace(given, problem=given.problem.with_prior(prior, given.problem.prior_time), states=states)
 
 
 def posed(measured: Measured, chosen: Chosen, guess: Guess) -> Problem:
@@ -270,6 +272,11 @@ def _followed(problem: Problem, first: Array, begun: float, times: Array, step: 
     if gap:
         nodes = np.linspace(begun, float(times[0]), max(ceil(abs(gap) / step), 1) + 1)
         first = follow(problem, nodes, first, step)[0][-1]
+    count = dense_grid(problem, times, step)
+    if count:  # which costs a fraction of a step to each epoch
+        states = on_dense_grid(problem, times, first, count)[0]
+        if np.isfinite(states).all():
+            return states
     return follow(problem, times, first, step)[0]
 
 

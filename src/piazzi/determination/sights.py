@@ -28,6 +28,7 @@ FAR = 1e7  # m: where a body is put to ask a sensor what it adds
 PLACES = (("position_x", "position_y", "position_z"), ("px", "py", "pz"))
 PAIRS = (("azimuth", "elevation"), ("x_east", "y_north"), ("x_south", "y_east"), ("right_ascension", "declination"))
 ROUNDS = 3
+LONG = 60 * 86400.0  # s: of rows spread more thinly each instant is worked out by itself
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +176,9 @@ def observers(epoch: Epoch, station: Station, t: Array) -> tuple[Array, Array]:
     recipe: Any = station.place
     if not hasattr(recipe, "at"):  # in orbit: a table of both
         found = np.array([recipe.value(float(x)) for x in t])
+        return found[:, :3], found[:, 3:]
+    if len(t) and hasattr(recipe, "pieces") and np.ptp(t) < LONG:  # by the table that kernels will read
+        found = recipe.arrays(t)
         return found[:, :3], found[:, 3:]
     half = 0.5
     before, here, after = (recipe.at([epoch + float(v) for v in t + shift]) for shift in (-half, 0.0, half))

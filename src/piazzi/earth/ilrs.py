@@ -43,13 +43,14 @@ def _packed(epoch: Epoch | None) -> str:
     return date if clock == "00:00:00" else f"{date}T{clock}"
 
 
+@cache  # of few dates: those of earthquakes
 def _unpacked(text: str) -> Epoch | None:
     return None if text == "-" else Epoch(f"{text} UTC")
 
 
 @cache
 def _sinex() -> Sinex:
-    sinex, site = Sinex({}, {}, {}), ""
+    sinex, site, reference = Sinex({}, {}, {}), "", Epoch(REFERENCE)
     text = files("piazzi.earth").joinpath("data", "ilrs.txt").read_text(encoding="utf-8")
     for row in text.splitlines():
         kind, *cells = row.split()
@@ -59,7 +60,7 @@ def _sinex() -> Sinex:
         elif kind == "C":
             x, y, z, vx, vy, vz = (float(cell) for cell in cells[3:])
             spans = _unpacked(cells[1]), _unpacked(cells[2])
-            row_of = Coordinates((x, y, z), (vx, vy, vz), Epoch(REFERENCE), *spans, cells[0])
+            row_of = Coordinates((x, y, z), (vx, vy, vz), reference, *spans, cells[0])
             sinex.coordinates.setdefault(site, []).append(row_of)
         elif kind == "E":
             up, north, east = (float(cell) for cell in cells[2:])

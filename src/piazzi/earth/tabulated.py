@@ -34,6 +34,7 @@ DAY = scales.DAY
 DAYS = (
     8192  # that are kept, of all tables: years of a problem with a few, at most 10 kB each; fewer, and none would be met again
 )
+AROUND = 256  # whose block is kept too, for values one by one
 _UTC_FROM = -1262304000.0  # s past J2000.0: 1960; before it days begin at 0h TT
 
 
@@ -74,7 +75,7 @@ class Tabulated:
     def pieces(self, first: float, last: float) -> Pieces:
         """The polynomials from the day of `first` to that of `last` (s)."""
         midnight = -sum(_of_day(self.epoch))
-        a, b = (floor((t - midnight) / DAY) for t in (first, last))
+        a, b = day_of(self.epoch, first), day_of(self.epoch, last)
         coefficients = np.concatenate([_day(self.table, k) for k in range(a, b + 1)])
         zero = np.zeros(coefficients.shape[2])
         return Pieces(midnight + a * DAY, self.LENGTH, coefficients, zero, zero)
@@ -86,12 +87,12 @@ class Tabulated:
     def value(self, *t: float) -> tuple[float, ...]:
         """The columns at `t`."""
         check_count(self.signature, t)
-        return value(self.signature, self.block(*t, *t), *t)
+        return value(self.signature, _around(self, *t), *t)
 
     def derivatives(self, *t: float) -> Array:
         """The rates of the columns at `t`, (columns, 1)."""
         check_count(self.signature, t)
-        return derivatives(self.signature, self.block(*t, *t), *t)
+        return derivatives(self.signature, _around(self, *t), *t)
 
     def arrays(self, t: Array) -> Array:
         """Values at times (K,), a row for each."""
@@ -115,6 +116,22 @@ def _day(recipe: _Daily, number: int) -> Array:
     coefficients = found.coefficients
     coefficients.flags.writeable = False
     return coefficients
+
+
+def day_of(epoch: Epoch, t: float) -> int:
+    """The day of `t`, counted from that of the epoch."""
+    return floor((t + sum(_of_day(epoch))) / DAY)
+
+
+def _around(recipe: Tabulated, t: float) -> Array:
+    """The data of the day of `t`: checks at the door ask for many values of the same."""
+    return _block_of_day(recipe, day_of(recipe.epoch, t))
+
+
+@lru_cache(maxsize=AROUND)
+def _block_of_day(recipe: Tabulated, number: int) -> Array:
+    noon = (number + 0.5) * DAY - sum(_of_day(recipe.epoch))
+    return recipe.block(noon, noon)
 
 
 @dataclass(frozen=True)
@@ -173,7 +190,7 @@ class Rotation(Tabulated):
 
     def matrix(self, t: float) -> tuple[Array, Array]:
         """The matrix and its time derivative."""
-        table, data = Signature.of_table(9, self.TERMS), self.block(t, t)
+        table, data = Signature.of_table(9, self.TERMS), _around(self, t)
         R = np.array(value(table, data, t)).reshape(3, 3)
         rate = derivatives(table, data, t).reshape(3, 3)
         return (R.T, rate.T) if self.signature.transposed else (R, rate)

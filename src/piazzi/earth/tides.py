@@ -7,6 +7,8 @@ as the conventions have it.  Loading by the ocean and the air is left out.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from piazzi.earth.scales import Orientation
 
 # IERS Conventions 2010, 7.1.1: the Earth's radius (m), masses of Sun and Moon in masses of the Earth, Love and Shida numbers
 RADIUS = 6378136.6
+SHARED = 64  # times of tables, of a day each, whose sky is kept for the next station
 SUN_MASS, MOON_MASS = 332946.0482, 0.0123000371
 H2, H2_LATITUDE, L2, L2_LATITUDE = 0.6078, -0.0006, 0.0847, 0.0002
 H3, L3 = 0.292, 0.015
@@ -49,9 +52,20 @@ _LONG = np.array([
 
 def station_displacement(position: Array, epoch: Epoch | Iterable[Epoch], eop: Orientation | None = None) -> Array:
     """How far solid tide and pole tide move ITRF places (3,) or (K, 3), in metres along X, Y, Z."""
+    epoch = epoch if isinstance(epoch, Epoch) else tuple(epoch)
+    known: Any = tables() if eop is None else eop
+    _, sun, moon = above(epoch, known)
+    return solid_tide(position, sun, moon, epoch, eop) + pole_tide(position, epoch, eop)
+
+
+@lru_cache(maxsize=SHARED)
+def above(epoch: Epoch | tuple[Epoch, ...], eop: Any) -> tuple[Array, Array, Array]:
+    """The matrix from the GCRF to the ITRF, and Sun and Moon in the ITRF (m), which all stations have in common."""
     turn = rotation("GCRF", "ITRF", epoch, eop)
     sun, moon = (np.einsum("...ij,...j->...i", turn, body(name, epoch)[0]) for name in ("sun", "moon"))
-    return solid_tide(position, sun, moon, epoch, eop) + pole_tide(position, epoch, eop)
+    for one in (turn, sun, moon):
+        one.setflags(write=False)
+    return turn, sun, moon
 
 
 def solid_tide(

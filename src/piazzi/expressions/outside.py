@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection
+from functools import lru_cache
 
 from piazzi.expressions import check
 from piazzi.expressions.functions import TABLE
 from piazzi.expressions.language import Call, ExpressionError, Name, Negative, Node, Number, Power, Product, Sum, fold
-from piazzi.expressions.limits import read
+from piazzi.expressions.limits import REMEMBERED, read
 from piazzi.expressions.parse import parse
 
 _ORDER = re.compile(r",\s*order\s*=\s*(\d+)\s*\)")  # at(offset, order=2): the one argument that is written with its name
@@ -49,12 +50,21 @@ def whole_call(text: str, outside: Collection[str] | None) -> bool:
 
 def _tree(text: str, outside: Collection[str] | None) -> Node:
     """The tree of an equation; that of one which is all of the language is shared with its other readers."""
-    try:
-        return read(text).tree
-    except ExpressionError:
-        if outside is not None and not outside:
-            raise
-        return parse(text, outside).tree
+    hashable: object = text
+    known = None if outside is None else tuple(outside)
+    return _read(text, known, tuple(TABLE)) if isinstance(hashable, str) else read(text).tree
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _read(text: str, outside: tuple[str, ...] | None, language: tuple[str, ...]) -> Node:
+    """The same, once of a text, where functions of the `language` and from outside have these names."""
+    if not any(f"{name}(" in text for name in outside or ()):
+        try:
+            return read(text).tree
+        except ExpressionError:
+            if outside is not None and not outside:
+                raise
+    return parse(text, outside).tree
 
 
 def _bare(text: str) -> str:

@@ -20,6 +20,7 @@ from piazzi.model.values import with_values
 from piazzi.problem.checks import Array, numeric
 from piazzi.problem.parts import Station
 
+RATE = "rate_at_once_of_"
 MOST_KINDS = 100  # for which no kernel was wanted yet: of so many more kinds of problem, these are forgotten
 _ROOM = [MOST_KINDS]
 _SPECS: dict[tuple[Any, ...], dict[tuple[Any, ...], KernelSpec]] = {}
@@ -120,17 +121,41 @@ def singular_equation(
     for state, equation in zip(model.states, model.dynamics, strict=True):
         if not np.isfinite(evaluate(equation, values)):
             return f"the dynamics of {state!r} have no finite value at the prior mean ({at})"
+    moved, values = _with_rates(model, values)
     for station in _unlike(stations):
         sensor = model.sensor(station.sensor)
+        there = dict(functions) | {STATION: _Held(station.place)}
+        here = with_values(values | dict(station.numbers), sensor.definitions, functions=there, model=moved)
         for component, equation in zip(sensor.components, sensor.equations, strict=True):
-            there = dict(functions) | {STATION: _Held(station.place)}
-            here = with_values(values | dict(station.numbers), sensor.definitions, functions=there, model=model)
             if not np.isfinite(evaluate(equation, here)):
                 lost = next((d.names[0] for d in sensor.definitions if d.function == ROOT and isnan(here[d.names[0]])), None)
                 if lost is not None:
                     return f"root {lost!r} of station {station.name!r} has no solution at the prior mean ({at})"
                 return f"component {component!r} of station {station.name!r} has no finite value at the prior mean ({at})"
     return ""
+
+
+class _Moved:
+    """A model whose rates at one state are known: all that the state a light time before needs of it."""
+
+    def __init__(self, model: Model) -> None:
+        self.states, self.definitions = model.states, ()
+        self.dynamics = tuple(text if text in model.states else f"{RATE}{s}" for s, text in _moves(model))
+
+
+def _moves(model: Model) -> Iterable[tuple[str, str]]:
+    """States with the text of their rates."""
+    return zip(model.states, model.dynamics, strict=True)
+
+
+def _with_rates(model: Model, values: Mapping[str, float]) -> tuple[Any, dict[str, float]]:
+    """What stands for the model at these values, and they with the rates: forces are worked out once, not at every iteration.
+
+    The model itself where measurements are of a state at another time by more than a straight way, or it has such names.
+    """
+    if model.looks_elsewhen or model.discrete or any(name.startswith(RATE) for name in values):
+        return model, dict(values)
+    return _Moved(model), dict(values) | {f"{RATE}{s}": evaluate(text, values) for s, text in _moves(model)}
 
 
 def _unlike(stations: Iterable[Station]) -> Iterable[Station]:

@@ -23,6 +23,8 @@ from piazzi.problem.epochs import check_near, epoch_given
 from piazzi.problem.parts import Gaussian, Manoeuvre, Station, Truth
 from piazzi.text import listed, nearest
 
+_OF_PRIOR = ("mean", "covariance", "prior_bundle", "_steps")  # what is worked out of it
+
 
 @dataclass(frozen=True, eq=False)
 class Problem(Shown):
@@ -219,6 +221,21 @@ class Problem(Shown):
         if not self.approximated:
             return self
         return replace(self, functions={name: outside.exact(recipe) for name, recipe in self.functions.items()})
+
+    def with_prior(self, prior: Gaussian, prior_time: float | None) -> Problem:
+        """The same with another belief in its states: what else it is made of was checked when it was made.
+
+        Whether equations have values at the new mean is not asked: it is for states of an orbit that was followed to there.
+        """
+        if prior_time is not None and not isfinite(prior_time):
+            raise ValueError(f"prior_time is {prior_time}; it must be finite")
+        check_near(prior_time or 0.0, self.epoch, "prior_time")
+        found = object.__new__(Problem)
+        gone = _OF_PRIOR if prior_time == self.prior_time else (*_OF_PRIOR, "_told")
+        found.__dict__.update({name: value for name, value in self.__dict__.items() if name not in gone})
+        found.__dict__.update(prior=checked.prior(prior, self.model), prior_time=prior_time)
+        found._lay_out()
+        return found
 
     @cached_property
     def prior_bundle(self) -> Belief:
