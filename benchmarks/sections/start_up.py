@@ -60,7 +60,8 @@ def _cpu(command: list[str], environment: Mapping[str, str] | None = None, repea
 
 def _cpu_once(command: list[str], environment: Mapping[str, str]) -> float:
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | environment)
+    given = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}  # what pip installs has it
+    done = subprocess.run(command, capture_output=True, text=True, env=given | dict(environment))
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode:
         raise UnavailableError(f"{' '.join(command)} ended with {done.returncode}: {done.stderr.strip().splitlines()[-1:]}")
