@@ -143,7 +143,7 @@ def test_complete_is_what_a_fit_with_the_larger_field_changes(given):
     assert said.figure == max(found.values()) and said.ok is (said.figure <= 1.0)
     named = {
         "gravity to degree 12 instead of degree 6",
-        "tides by frequency",
+        "the pole tide",
         "frame dragging",
         "the pull of Venus",
         "sunlight",
@@ -152,7 +152,7 @@ def test_complete_is_what_a_fit_with_the_larger_field_changes(given):
     assert read_forces(words, 6000e3).forces.degree == 12 and words.startswith(
         "default relativity=schwarzschild,lense-thirring "
     )
-    assert words.endswith("degree=12 radiation=cannonball bodies=sun,moon,venus tides=solid,k1")
+    assert words.endswith("degree=12 radiation=cannonball tides=solid,k1,pole bodies=sun,moon,venus")
     assert said.ok or f"--forces '{words_for(small.setup, [n for n, moved in found.items() if moved > 1.0])}'" in said.sentence
 
 

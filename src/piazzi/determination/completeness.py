@@ -18,6 +18,7 @@ from piazzi.determination.setup import Setup, scale_of
 from piazzi.determination.sweep import swept
 from piazzi.earth import Forces, Gravity
 from piazzi.earth.defaults import AIR_BELOW, DRAGGED, REFLECTED, lowest_height
+from piazzi.earth.force_options import TIDES
 from piazzi.earth.force_text import Force
 from piazzi.evaluate.information import singular, whitened
 from piazzi.expressions import evaluate_arrays
@@ -30,12 +31,10 @@ LARGEST = 120  # degree of the fields of the package
 LEAST = 4  # degree that the Earth as a point, or flattened, is compared with
 NODES, MOST = 48, 6000  # of a turn, and in all, at which accelerations are added up
 BODIES = ("sun", "moon", "venus", "jupiter")
-TIDES = ("solid", "k1", "pole")
 RELATIVITY = ("schwarzschild", "lense-thirring", "de-sitter")
 WORDS = {
     "radiation_on": "sunlight", "drag_on": "air", "relativity_on": "relativity", "lense_thirring_on": "frame dragging",
-    "de_sitter_on": "de Sitter's precession", "tides_on": "solid tides", "k1_on": "tides by frequency",
-    "pole_on": "the pole tide",
+    "de_sitter_on": "de Sitter's precession", **dict(zip(("tides_on", "k1_on", "pole_on"), TIDES.values(), strict=True)),
 }  # fmt: skip
 
 
@@ -132,7 +131,7 @@ def _pulls(given: Setup, t: Array, path: Array) -> Iterator[tuple[str, Array]]:
     own, choice = given.chosen.forces, given.chosen.choice
     low = lowest_height(path[0, :3], path[0, 3:6]) < AIR_BELOW
     every = Forces(
-        gravity=own.field, degree=2, bodies=BODIES, tides=TIDES, relativity=RELATIVITY, radiation="cannonball",
+        gravity=own.field, degree=2, bodies=BODIES, tides=tuple(TIDES), relativity=RELATIVITY, radiation="cannonball",
         drag="harris-priester" if low and not own.drag else False, shadows=own.shadows,
     )  # fmt: skip
     there = {part.switch for part in own.parts if given.problem.parameters.get(part.switch, 1.0)}

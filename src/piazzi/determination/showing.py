@@ -11,6 +11,7 @@ from piazzi.determination.document import document
 from piazzi.determination.physical import believed, said_name
 from piazzi.determination.setup import Setup
 from piazzi.determination.verdict import apart_by
+from piazzi.earth.force_options import TIDES
 from piazzi.evaluate.grids import Grid
 from piazzi.evaluate.quantities import display_of, displays, number, with_sigma
 from piazzi.text import printable
@@ -134,7 +135,7 @@ def remarks(facts: Mapping[str, Any]) -> Iterator[str]:
         if forces["degree"]
         else f"the {facts.get('about', 'earth').title()} as a point"
     )
-    names = [field, *forces["bodies"], *(f"{t} tides" for t in forces["tides"]), *extra, *forces["empirical"]]
+    names = [field, *forces["bodies"], *(TIDES[t] for t in forces["tides"]), *extra, *forces["empirical"]]
     yield f"Forces ({forces['source']}): {', '.join(names)}."
     if "against" in facts:
         apart = facts["against"]

@@ -16,6 +16,7 @@ from piazzi.earth.constants import GM
 from piazzi.earth.eop import EOP, read_eop
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.finding import check_kernel, found
+from piazzi.earth.force_options import TIDES
 from piazzi.earth.forces import Forces
 from piazzi.earth.scales import Orientation
 from piazzi.earth.space_weather import SpaceWeather, read_space_weather
@@ -27,6 +28,7 @@ from piazzi.text import brief, nearest
 from piazzi.units import Units, is_quantity
 
 DEGREES = (8, 12, 20, 40, 70)
+USUAL_TIDES = ("solid", "k1")  # without the second LAGEOS-2 moves by 1.6 sigma in three days, Stella by 2.2
 CUT = 1e-5  # of the central term at the lowest point, where the field is cut off
 AIR_BELOW = 1000e3  # m of height
 REFLECTED, DRAGGED = 0.013, 0.022  # m2/kg: coefficients 1.3 and 2.2 on 0.01 m2/kg, of a satellite that nobody knows
@@ -91,7 +93,7 @@ class ForceChoice:
 
     def __str__(self) -> str:
         f = self.forces
-        words = [f"{f.field.name} to degree {f.degree}", *f.bodies, *(f"{tide} tide" for tide in f.tides)]
+        words = [f"{f.field.name} to degree {f.degree}", *f.bodies, *(TIDES[tide] for tide in f.tides)]
         words += ["relativity"] if f.relativity else []
         words += [f"radiation ({f.radiation})"] if f.radiation else []
         words += [f"drag ({f.drag})"] if f.drag else []
@@ -123,7 +125,7 @@ def _usual(height: float) -> dict[str, Any]:
         raise ValueError(f"the orbit comes down to {height / 1e3:,.0f} km: it is below the surface of the Earth")
     wanted = ceil(log(CUT) / log(RADIUS / (RADIUS + height)))
     degree = next((n for n in DEGREES if n >= wanted), DEGREES[-1])
-    out: dict[str, Any] = {"degree": degree, "radiation": "cannonball"}
+    out: dict[str, Any] = {"degree": degree, "radiation": "cannonball", "tides": USUAL_TIDES}
     if height < AIR_BELOW:
         out |= {"drag": "harris-priester", "air_height": max(round(height, -4), 100e3)}
     return out

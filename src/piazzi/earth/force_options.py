@@ -15,12 +15,12 @@ UNITS = {
     **dict.fromkeys((*CONSTANT, *ONCE_PER_REV, *force_sun.NONGRAVITATIONAL), "m/s^2"),
 }  # fmt: skip
 _RELATIVITY = ("schwarzschild", "lense-thirring", "de-sitter")
-_TIDES = ("solid", "k1", "pole")
+TIDES = {"solid": "solid tides", "k1": "tides by frequency", "pole": "the pole tide"}  # and words for them
 _SHADOWS = ("earth", "moon")
 _KNOWN: dict[str, dict[str, tuple[str, ...]]] = {
     "earth": {
         "bodies": force_text.BODIES,
-        "tides": _TIDES,
+        "tides": tuple(TIDES),
         "relativity": _RELATIVITY,
         "shadows": _SHADOWS,
         "empirical": ("constant", "once-per-rev", *CONSTANT, *ONCE_PER_REV),
