@@ -13,6 +13,9 @@ from piazzi.earth import Epoch
 from piazzi.estimate.estimator import Estimate
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
+from piazzi.problem.dense import products, within_kinks
+
+ROUNDED = 1e-6  # s: dates that are an epoch but for rounding
 
 
 def beliefs(given: Setup, estimate: Estimate, epochs: Sequence[Epoch]) -> tuple[Array, Array]:
@@ -26,13 +29,30 @@ def beliefs(given: Setup, estimate: Estimate, epochs: Sequence[Epoch]) -> tuple[
     t = np.array([epoch - given.measured.epoch for epoch in epochs])
     mean, P = np.empty((len(t), given.problem.model.n)), np.empty((len(t), *estimate.covariance.shape[1:]))
     nodes = estimate.times
-    base = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, len(nodes) - 1)
-    if given.problem.is_noise_free and estimate.view == "delayed" and len(t) > 1:
-        base[:] = base.min()  # one orbit: the first of them serves all
-    for k in np.unique(base):
-        own = np.flatnonzero(base == k)
+    base = np.clip(np.searchsorted(nodes, t + ROUNDED, side="right") - 1, 0, len(nodes) - 1)
+    one_orbit = given.problem.is_noise_free and estimate.view == "delayed" and len(t) > 1
+    later = np.flatnonzero(one_orbit & (t >= nodes[0]))
+    if len(later):
+        mean[later], P[later] = _along(given, estimate, base[later], t[later])
+    alone = np.setdiff1d(np.arange(len(t)), later)
+    for k in np.unique(base[alone]):
+        own = alone[base[alone] == k]
         mean[own], P[own] = _from(given, estimate, int(k), t[own])
     return mean[:, :6], P[:, :6, :6] + departure(given, estimate, t)
+
+
+def _along(given: Setup, estimate: Estimate, base: Array, t: Array) -> tuple[Array, Array]:
+    """Beliefs at times of one orbit, in one run from the first of their epochs.
+
+    What the fit says at each epoch is kept: what its own steps and these make of a shadow differs by millimetres.
+    """
+    first = int(base.min())
+    own = estimate.times[first : int(base.max()) + 1]
+    nodes = np.unique(np.concatenate([own, t]))
+    x, Phi = follow(given.problem, nodes, estimate.mean[first], within_kinks(given.problem.model, given.chosen.max_step))
+    W, at, epoch = products(Phi), np.searchsorted(nodes, t), np.searchsorted(nodes, own)[base - first]
+    off = np.linalg.solve(W[epoch], (estimate.mean[base] - x[epoch])[..., None])
+    return x[at] + (W[at] @ off)[..., 0], W[at] @ estimate.covariance[first] @ np.swapaxes(W[at], 1, 2)
 
 
 def _from(given: Setup, estimate: Estimate, k: int, t: Array) -> tuple[Array, Array]:
@@ -52,6 +72,7 @@ def _from(given: Setup, estimate: Estimate, k: int, t: Array) -> tuple[Array, Ar
 
 def carried_to(problem: Problem, step: float, start: float, x: Array, P: Array, t: Array) -> tuple[Array, Array]:
     """States (K, n) and covariances at times that are all after `start`, or all before, by steps of at most `step`."""
+    step = within_kinks(problem.model, step)
     order = np.unique(t) if t[0] >= start else np.unique(t)[::-1]
     nodes, marks = [start], []
     for when in order.tolist():

@@ -18,6 +18,7 @@ from piazzi.problem.stepping import STAGES
 
 FINER, RESOLVED = 1.5, 20  # steps of the multi-step method for one of order 8; more for fields beyond a degree of 30
 KINKED = 40.0  # s: the longest of them where forces have kinks
+SHORT = 20.0  # s: steps of order 8 that leave less than a millimetre at the edges of shadows in days of LAGEOS-2
 KINKS = re.compile(r"\b(?:abs|sign|min|max|heaviside)\(")
 WORTH = 3  # times the evaluations of a grid, from which on it is the faster way by far
 BEGINNING = 10  # steps of order 8 that a grid begins with
@@ -39,6 +40,11 @@ def dense_grid(problem: Problem, times: Array, step: float) -> int:
     count = int(np.ceil((times[-1] - times[0]) / longest))
     alone = STAGES * np.ceil(np.diff(times) / step).sum()
     return count if count >= FEWEST and alone >= WORTH * (count + STAGES * BEGINNING) else 0
+
+
+def within_kinks(model: Model, step: float) -> float:
+    """The step of order 8 (s) of orbits between epochs, no longer than kinks of the forces allow, as edges of shadows are."""
+    return min(step, SHORT) if kinked(model) else step
 
 
 @lru_cache(maxsize=64)

@@ -1,0 +1,33 @@
+"""An orbit is the same one however it is asked for, within a millimetre: edges of shadows lie within steps of any grid."""
+
+from dataclasses import replace
+
+import numpy as np
+
+import piazzi as pz
+from piazzi.determination.approach import approached
+from piazzi.determination.course import course_of
+from piazzi.determination.determining import solved
+from piazzi.determination.fit import estimators
+from piazzi.evaluate.information import predicted
+from piazzi.problem.inputs import prepare
+from tests.determination.lasers import SIGMA, twelve_passes
+
+
+def test_an_ephemeris_is_the_orbit_and_the_answer():
+    given = twelve_passes()
+    z = predicted(given.problem, prepare(given.problem, given.tracking), given.states)
+    z += SIGMA * np.random.default_rng(5).standard_normal(z.shape)
+    tracking = given.tracking
+    measured = pz.Tracking(tracking.row_times, z, tracking.row_stations, epoch=tracking.epoch)
+    found = solved(approached(replace(given, tracking=measured)), estimators(("graph",)))
+    written = found.ephemeris(span="first .. last+12h", step=60.0)
+    course = course_of(written, found.epoch)
+    answer = course.beliefs(np.array([found.epoch - course.epoch]))[0][0]
+    index = found.setup.solution
+    np.testing.assert_allclose(answer[:3], found.estimate.mean[index, :3], rtol=0, atol=1e-3)
+    (arc,) = written.arcs
+    for k in range(0, len(arc.t), 97):
+        alone = found.orbit.at(arc.epoch + float(arc.t[k]))
+        np.testing.assert_allclose(arc.position[k], alone[:3], rtol=0, atol=1e-3)
+        np.testing.assert_allclose(arc.velocity[k], alone[3:], rtol=0, atol=1e-6)
