@@ -48,7 +48,7 @@ _TIMES: Mapping[str, float] = {
 }  # fmt: skip
 _DURATION = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z]*)", re.ASCII)
 
-_FACTOR = re.compile(r"\s*(?:1|([A-Za-z]+)\s*(?:\^\s*([+-]?\d{1,2}(?:\.\d{1,3})?))?)\s*")
+_FACTOR = re.compile(r"\s*(?:1|([A-Za-z]+)(?:\s*\^\s*([+-]?\d{1,2}(?:\.\d{1,3})?)|([2-9]))?)\s*")
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z].*)", re.ASCII)
 
 
@@ -132,7 +132,7 @@ class Units:
         return self.base != SI
 
     def unit(self, text: str) -> Unit:
-        """The unit that a text such as "km/s", "length**3/time**2" or "1" stands for.
+        """The unit that a text such as "km/s", "length**3/time**2" or "1" stands for; "m/s2" is "m/s**2".
 
         Raises
         ------
@@ -148,7 +148,7 @@ class Units:
             if match[1] is None:
                 continue
             value, base = self._named(match[1])
-            power = Fraction(match[2] or 1) * (-1 if joint == "/" else 1)
+            power = Fraction(match[2] or match[3] or 1) * (-1 if joint == "/" else 1)
             factor *= _power(value, power)
             powers = [p + power * b for p, b in zip(powers, base, strict=True)]
         if not 0 < factor < math.inf:

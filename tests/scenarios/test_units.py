@@ -200,3 +200,12 @@ def test_any_text_is_a_unit_or_a_value_error(text):
         assert len(str(error).splitlines()) == 1
     else:
         assert 0 < unit.factor < np.inf
+
+
+def test_a_digit_behind_a_name_is_its_power():
+    """As people write m/s2 and m2/kg."""
+    units = Units()
+    assert units.unit("m/s2") == units.unit("m/s**2") and units.unit("m2/kg") == units.unit("m**2/kg")
+    for text in ("m1", "m22", "2m", "m 2", "m2**2"):
+        with pytest.raises(ValueError, match="is no unit"):
+            units.unit(text)

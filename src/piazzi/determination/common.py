@@ -1,4 +1,4 @@
-"""Errors that the rows of a pass have in common, found by their residuals before sigmas are believed.
+"""Errors that the rows of a pass of a laser have in common, as unknowns beside the orbit.
 
 A station's bias changes from pass to pass by more than its normal points scatter.  Rows that share it know less together than
 as many that do not, and where nothing stands for it good passes look like outliers.
@@ -32,39 +32,47 @@ MEDIAN = np.pi / 2  # times the variance of a mean of normal values is that of t
 LASER = 0.022
 MOST = 10.0 * LASER  # m: of the sigma of a bias, not of a fault
 BISECTIONS = 40
-SOURCE = "the stability that the ILRS asks of its stations, 2 cm from pass to pass and 1 cm in the long term"
+BIASES = (
+    f"a bias of each pass of a laser is estimated, before the measurements 0 +- {LASER:g} m "
+    "(the stability that the ILRS asks of its stations, 2 cm from pass to pass and 1 cm in the long term)"
+)
 
 
-def with_common_errors(given: Setup) -> Setup:
-    """The set-up with a bias for each pass of lasers, where residuals near the answer say that passes have some.
+def with_pass_biases(seen: Measured) -> Measured:
+    """The measurements with a bias for each pass of lasers, unless the user says what ranges are off by.
 
-    Nothing is added where the user says what ranges are off by.
+    Residuals do not tell whether there are some: an arc of a few passes takes them up into the orbit, and what is left looks
+    like noise.  So they are there before any residual is.
     """
-    laser = _laser_rows(given)
-    said = any(name.startswith("range_bias") for name in given.measured.parameters)
-    if said or not laser.any() or not np.isfinite(given.states).all():
+    if any(name.startswith("range_bias") for name in seen.parameters):
+        return seen
+    laser = np.array([segment.wavelength is not None for segment in seen.observations.segments], dtype=np.bool_)
+    first = seen.rows[:, 0]
+    own = (first >= 0) & laser[seen.observations.segment[np.maximum(first, 0)]]
+    labels = sorted({seen.labels[name] for name in seen.tracking.row_stations[own].tolist()})
+    if not labels:
+        return seen
+    found = with_instruments(
+        seen, [Asked(Estimated(f"bias.range.{n}", PASS, LASER), "estimated", "--estimate") for n in labels]
+    )
+    return replace(found, assumed=(*seen.assumed, BIASES))
+
+
+def with_wider_biases(given: Setup) -> Setup:
+    """The set-up with wider priors for biases of stations that contradict the usual sigma: not all keep to it."""
+    if BIASES not in given.assumed or not np.isfinite(given.states).all():
         return given
-    score = together(given, analysed(given, given.states), laser)
-    return given if score is None or score[0] <= quantile(SURE, score[1]) else with_pass_biases(given)
-
-
-def with_pass_biases(given: Setup) -> Setup:
-    """The set-up with a bias of ranges for each pass; its prior and states are otherwise as they were.
-
-    Stations whose biases contradict the usual sigma have a wider one: not all of them are what the ILRS asks for.
-    """
-    seen = with_instruments(given.measured, [Asked(Estimated("bias.range", PASS, LASER), "estimated", "--estimate")])
-    text = f"a bias of each pass is estimated, before the measurements 0 +- {LASER:g} m ({SOURCE}), as residuals show some"
-    found = replace(renewed(given, seen, given.chosen), assumed=(*given.assumed, text))
-    biases = _of_stations(seen, [name for name in seen.parameters if name not in given.measured.parameters])
-    wider = _wider(found, biases)
+    seen = given.measured
+    biases = _of_stations(seen, [name for name in seen.parameters if name.startswith("range_bias")])
+    wider = _wider(given, biases)
     if not wider:
-        return found
+        return given
     known = {name: wider[label] for label, names in biases.items() if label in wider for name in names}
     parameters = {**seen.parameters, **{name: ("estimated", Gaussian(0.0, sigma**2)) for name, sigma in known.items()}}
     told = ", ".join(f"{sigma:.2g} m at {label}" for label, sigma in wider.items())
-    found = renewed(found, replace(seen, parameters=parameters), found.chosen)
-    return replace(found, assumed=(*given.assumed, f"{text}; +- {told}, where they are larger than that allows"))
+    text = f"{BIASES}; +- {told}, where they are larger than that allows"
+    found = renewed(given, replace(seen, parameters=parameters), given.chosen)
+    return replace(found, assumed=tuple(text if one == BIASES else one for one in given.assumed))
 
 
 def _of_stations(seen: Measured, names: Sequence[str]) -> dict[str, list[str]]:
@@ -137,11 +145,3 @@ def together(given: Setup, analysis: Analysis, rows: Array) -> tuple[float, int]
             if len(known) >= FEWEST:
                 squares.append(float(np.median(known)) ** 2 * len(known) / MEDIAN)
     return (float(np.sum(squares)), len(squares)) if squares else None
-
-
-def _laser_rows(given: Setup) -> Array:
-    """Which rows (J,) are ranges of lasers."""
-    observations = given.measured.observations
-    laser = np.array([segment.wavelength is not None for segment in observations.segments], dtype=np.bool_)
-    first = given.rows[:, 0]
-    return (first >= 0) & laser[observations.segment[np.maximum(first, 0)]]

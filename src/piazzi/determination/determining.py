@@ -17,7 +17,7 @@ from piazzi.determination.approach import approached, refined
 from piazzi.determination.burns import burns_of
 from piazzi.determination.case import Case
 from piazzi.determination.case_file import split
-from piazzi.determination.common import with_common_errors
+from piazzi.determination.common import with_pass_biases, with_wider_biases
 from piazzi.determination.density import with_density
 from piazzi.determination.earlier import Earlier, earlier_of, fresh
 from piazzi.determination.editing import edited
@@ -155,10 +155,10 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
 
 
 def ready(given: Setup) -> Setup:
-    """The set-up near its answer, with the noise that it shows: of the air where drag matters, of passes that have some."""
+    """The set-up near its answer, with the noise that it shows: of the air where drag matters, of stations, of fixes."""
     near = approached(given)
     found = with_density(near)
-    return with_white_fixes(with_common_errors(near if found is near else refined(found)))
+    return with_white_fixes(with_wider_biases(near if found is near else refined(found)))
 
 
 def fitting_orbits(*tracking: Any, case: Case | None = None, **words: Any) -> InitialOrbits:
@@ -181,7 +181,7 @@ def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[[Guess], 
     if seen.about != "sun":
         check_forces(case.forces)  # an orbit that they are for may be long in coming
     seen = oriented(seen, orientation_of(case.forces))
-    seen = with_instruments(seen, [one for one in wanted if one.what.kind in INSTRUMENTS])
+    seen = with_pass_biases(with_instruments(seen, [one for one in wanted if one.what.kind in INSTRUMENTS]))
 
     def chosen(orbit: Guess) -> Chosen:
         if seen.about == "sun":
