@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +39,7 @@ from piazzi.model.derivation import constant_acceleration_step, derive, derive_e
 if TYPE_CHECKING:
     import sympy as sp
 
+MOST_MODELS = 16  # whose equations are remembered as source: modules of one determination differ in the rest
 SIDE = "p.sides[{}]"  # of an event, where the integrator knows it
 
 _ITERATION = re.compile(r"^ +for _ in range\(\d+\):$", re.M)  # as printed for a root
@@ -159,6 +161,7 @@ def _function(*what: Any) -> str:
     return with_used(function(*what))
 
 
+@lru_cache(maxsize=MOST_MODELS)
 def _dynamics_source(model: Model) -> str:
     d, (given, names) = derive(model), _arguments(model, beside="0.0")
     nd, n, called = len(model.moving), model.n, _called(model)
@@ -290,6 +293,7 @@ def _map_source(model: Model) -> str:
     )
 
 
+@lru_cache(maxsize=MOST_MODELS)
 def _sensor_source(model: Model) -> str:
     functions, measure, innovate = [], [], []
     measure_lanes, innovate_lanes = [], []
