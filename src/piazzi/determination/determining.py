@@ -36,7 +36,7 @@ from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object, oriented
 from piazzi.determination.setup import Setup, at_last_used, posed, setup
 from piazzi.determination.sun_forces import forces_about_the_sun
-from piazzi.determination.unguided import first_look, goes_about_the_sun, unguided
+from piazzi.determination.unguided import first_look, goes_about_the_sun, nominal, unguided
 from piazzi.determination.unknowns import BIAS, CLOCK, SCALE, asked
 from piazzi.determination.verdict import verdict
 from piazzi.determination.whiteness import with_white_fixes
@@ -52,6 +52,7 @@ from piazzi.problem.checks import Array
 SOURCES = (str, os.PathLike)
 INSTRUMENTS = (BIAS, SCALE, CLOCK)
 _OF_ROWS = "--frame {} names the axes of measurements whose file names none, and so not those of the answer"
+LOW = 6.8e6  # m: of an orbit on which every force acts
 ROUNDS = 4  # of the answer, while rows are left out or taken back
 
 
@@ -190,6 +191,8 @@ def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[[Guess], 
             found = chosen_forces(case.forces, orbit.state, name=seen.object, mass=case.mass, area=case.area)
         return with_unknowns(found, wanted, burns, seen)
 
+    if begin is None and wanted:
+        chosen(nominal(seen, LOW))  # what no orbit has is refused before one is looked for
     return seen, chosen, begin, earlier
 
 

@@ -35,25 +35,25 @@ def first_look(seen: Measured) -> Guess:
         Where no row says where the body is, or nothing fits.
     """
     if seen.about == "sun":  # whose forces do not depend on the orbit
-        return _nominal(seen)
+        return nominal(seen)
     rows = _plain(seen)
     kept = first_stretch(rows.t, EARTH.stretch)
     coarse = replace(rows, sigma=np.where(rows.kind[:, None] == DIRECTION, np.hypot(rows.sigma, AIR), rows.sigma))
     search = two_body_modes(coarse.of(kept), EARTH.region, motion=MOTION)
     if not search.modes and len(np.unique(rows.t)) < 3:  # anything will do: what they determine is found out later
-        return _nominal(seen)
+        return nominal(seen)
     if not search.modes:
         raise ValueError(_nothing(len(kept)))
     above = [mode for mode in search.modes if mode.admissible]
     if not above:  # orbits through the Earth only: forces of any other will do, to find out the same
-        return _nominal(seen)
+        return nominal(seen)
     best = above[0].state
     return Guess(seen.epoch + search.epoch, best[:3], best[3:], "initial orbits")
 
 
-def _nominal(seen: Measured) -> Guess:
-    """Some circular orbit."""
-    r = 2.5 * ASTRONOMICAL_UNIT if seen.about == "sun" else 8e6
+def nominal(seen: Measured, radius: float = 8e6) -> Guess:
+    """Some circular orbit, about the Earth of that radius (m)."""
+    r = 2.5 * ASTRONOMICAL_UNIT if seen.about == "sun" else radius
     v = float(np.sqrt(seen.centre.mu / r))
     return Guess(seen.epoch, np.array([r, 0.0, 0.0]), np.array([0.0, v, 0.0]), "initial orbits", about=seen.about)
 
