@@ -7,10 +7,11 @@ import numpy as np
 import piazzi as pz
 from piazzi.determination.approach import approached
 from piazzi.determination.course import course_of
-from piazzi.determination.determining import solved
+from piazzi.determination.determining import prepared, solved
 from piazzi.determination.fit import estimators
 from piazzi.evaluate.information import predicted
 from piazzi.problem.inputs import prepare
+from tests.determination.fixing import observations, truth
 from tests.determination.lasers import SIGMA, twelve_passes
 
 
@@ -31,3 +32,11 @@ def test_an_ephemeris_is_the_orbit_and_the_answer():
         alone = found.orbit.at(arc.epoch + float(arc.t[k]))
         np.testing.assert_allclose(arc.position[k], alone[:3], rtol=0, atol=1e-3)
         np.testing.assert_allclose(arc.velocity[k], alone[3:], rtol=0, atol=1e-6)
+
+
+def test_an_orbit_is_looked_for_where_forces_vary_by_chance():
+    """Without a guess: the search is of the forces without the process, which the problem has."""
+    t = np.arange(0.0, 7200.0, 600.0)
+    made = prepared(observations(truth(t)[:, :3], t, 5.0), estimate="along~3h=1e-9m/s^2")
+    assert len(made.problem.model.states) == 7
+    np.testing.assert_allclose(made.states[0, :3], truth(t)[0, :3], rtol=0, atol=1e3)

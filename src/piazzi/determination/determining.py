@@ -151,7 +151,7 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
     case = told.told(words) if case is None else case
     _, at = _instant(case.epoch)
     seen, chosen, begin, earlier = read(files, case)
-    begin = begin or unguided(seen, lambda first: posed(seen, chosen(first), first))
+    begin = begin or unguided(seen, lambda first: posed(seen, chosen(first, still=True), first))
     return setup(seen, chosen(begin), begin, at=at, earlier=earlier)
 
 
@@ -167,11 +167,11 @@ def fitting_orbits(*tracking: Any, case: Case | None = None, **words: Any) -> In
     files, told = split(tracking)
     case = told.told(words) if case is None else case
     seen, chosen, _, _ = read(files, replace(case, guess=None, prior=None))
-    return initial_orbits(posed(seen, chosen(first := first_look(seen)), first), seen.tracking)
+    return initial_orbits(posed(seen, chosen(first := first_look(seen), still=True), first), seen.tracking)
 
 
-def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[[Guess], Chosen], Guess | None, Earlier | None]:
-    """What was measured, the forces on an orbit, where to begin where somebody says it, and the orbit of before."""
+def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[..., Chosen], Guess | None, Earlier | None]:
+    """What was measured, the forces on an orbit (`still`: without processes), where to begin if said, the orbit of before."""
     wanted, burns = asked(case.estimate, case.consider), burns_of(case.manoeuvre)
     partners = partners_of(case.participant)
     everything = observations_of(files, case.answers)
@@ -184,12 +184,12 @@ def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[[Guess], 
     seen = oriented(seen, orientation_of(case.forces))
     seen = with_pass_biases(with_instruments(seen, [one for one in wanted if one.what.kind in INSTRUMENTS]))
 
-    def chosen(orbit: Guess) -> Chosen:
+    def chosen(orbit: Guess, still: bool = False) -> Chosen:
         if seen.about == "sun":
             found = forces_about_the_sun(case.forces, orbit.state)
         else:
             found = chosen_forces(case.forces, orbit.state, name=seen.object, mass=case.mass, area=case.area)
-        return with_unknowns(found, wanted, burns, seen)
+        return with_unknowns(found, [one for one in wanted if not (still and one.what.is_process)], burns, seen)
 
     if begin is None and wanted:
         chosen(nominal(seen, LOW))  # what no orbit has is refused before one is looked for
