@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import piazzi as pz
 from piazzi.determination import density
 from piazzi.determination.approach import approached
 from piazzi.determination.course import _estimated_air, _with_density, course_of
@@ -15,7 +16,9 @@ from piazzi.determination.orbit_forces import AirVaries, air_varies
 from piazzi.determination.physical import air_of, believed, is_node, nodes_of, said, share_of, slope_of, value_of
 from piazzi.determination.setup import follow
 from piazzi.estimate.chi_square import quantile
+from piazzi.evaluate.information import predicted
 from piazzi.orbit import state_axes
+from piazzi.problem.inputs import prepare
 from tests.references.determinations import (
     AIR,
     KINDS,
@@ -154,11 +157,28 @@ def test_the_next_night_knows_coefficient_and_density_as_results_have_them(found
     where = [facts["names"].index(name) for name in ("cd_a_m", f"density_{len(facts['density'])}", "density_cos")]
     np.testing.assert_allclose(told[own], np.array(facts["mean"])[where], rtol=1e-12)
     np.testing.assert_allclose(P[np.ix_(own, own)], np.array(facts["covariance"])[np.ix_(where, where)], rtol=1e-9)
+    assert believed(found.problem, "cd_a_m_log") == pytest.approx((0.02, 0.01))  # as cd_a_m=0.02 cd=0.5 says
+
+
+@pytest.fixture(scope="module")
+def next_night(found):
+    """Three hours behind it, whose prior it is: what is known of the density then is less than its steady sigma."""
+    t, which = seen_rows(AIR)
+    own = t < 3 * 3600.0
+    rows = ranges(AIR, t[own] + float(found.estimate.times[-1]) + 60.0, which[own])
+    facts = {**found.to_dict(), "verdict": {}}  # which may make sigmas larger
+    given = prepared(rows, prior=facts, stations=[station(n) for n in AIR.sites], **AIR.words)
+    z = predicted(given.problem, prepare(given.problem, given.tracking), given.states)
+    z += AIR.sigma * np.random.default_rng(9).standard_normal(z.shape)
+    tracking = pz.Tracking(given.tracking.row_times, z, given.tracking.row_stations, epoch=given.tracking.epoch)
+    return solved(ready(replace(given, tracking=tracking)), estimators(("graph",)))
 
 
 @pytest.mark.slow
-def test_a_file_of_a_determination_predicts_as_surely_as_the_determination(found):
+@pytest.mark.parametrize("night", ["found", "next_night"])
+def test_a_file_of_a_determination_predicts_as_surely_as_the_determination(night, request):
     """That of before held the density at its last value for sure: three days on its sigma was a third of what it is."""
+    found = request.getfixturevalue(night)
     read = course_of(found.to_dict(), found.epoch)
     last = found.estimate.mean[-1]  # the same forces, the waves of the density over a turn among them
     moved = read.problem.dynamics(read.problem.mean, 0.0)[3:6]

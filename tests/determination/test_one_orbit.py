@@ -32,6 +32,9 @@ def test_an_ephemeris_is_the_orbit_and_the_answer():
         alone = found.orbit.at(arc.epoch + float(arc.t[k]))
         np.testing.assert_allclose(arc.position[k], alone[:3], rtol=0, atol=1e-3)
         np.testing.assert_allclose(arc.velocity[k], alone[3:], rtol=0, atol=1e-6)
+        P, own = arc.covariance[k], found.orbit.covariance(arc.epoch + float(arc.t[k]))
+        scale = np.sqrt(np.diag(own))
+        np.testing.assert_allclose(P / np.outer(scale, scale), own / np.outer(scale, scale), rtol=0, atol=1e-3)
 
 
 def test_an_orbit_is_looked_for_where_forces_vary_by_chance():

@@ -9,8 +9,9 @@ import piazzi as pz
 from piazzi import earth
 from piazzi.determination import Guess, measured
 from piazzi.determination.approach import approached
+from piazzi.determination.case import Case
 from piazzi.determination.common import BIASES, LASER, with_wider_biases
-from piazzi.determination.determining import prepared, solved
+from piazzi.determination.determining import prepared, read, solved
 from piazzi.determination.fit import estimators
 from piazzi.estimate.chi_square import quantile
 from piazzi.evaluate.information import predicted
@@ -87,12 +88,32 @@ def test_each_pass_of_a_laser_has_a_bias_unless_the_user_says_what_ranges_are_of
     picked = np.array([[dict(s.numbers)[f"is_{name}"] for name in new] for s in given.problem.stations])
     assert (picked.sum(axis=1) == 1.0).all() and (picked.sum(axis=0) == 1.0).all()
     said = a_day(estimate="bias.range.7090=1m")
-    assert said.problem.model.constants == ("range_bias_1",) and BIASES not in said.assumed
+    names = [said.labels[c].name for c in said.problem.model.constants]
+    assert [n for n in names if "7090" in n] == ["bias.range.7090"] and len(names) == 1 + 9 and BIASES in said.assumed
+    sigmas = [float(said.problem.parameters[c].covariance[0, 0]) ** 0.5 for c in said.problem.model.constants]
+    assert sigmas == pytest.approx([1.0, *[LASER] * 9])
+    assert a_day(estimate="bias.range=1m").problem.model.constants == tuple(f"range_bias_{k}" for k in range(1, 5))
     radar = prepared(
         ranges(np.arange(0.0, 1500.0, 300.0), np.zeros(5, dtype=int), wavelength=None),
         guess=Guess(EPOCH, STATE[:3], STATE[3:], "test"), stations="ilrs", corrections="applied",
     )  # fmt: skip
     assert not radar.problem.model.constants and BIASES not in radar.assumed
+
+
+def test_biases_of_passes_are_not_made_of_rows_that_others_may_follow():
+    """Which pass a later row is of is not known when its station begins."""
+    rows = ranges(np.arange(0.0, 1500.0, 300.0), np.zeros(5, dtype=int))
+    case = Case(guess=Guess(EPOCH, STATE[:3], STATE[3:], "test"), stations="ilrs")
+    whole, live = read([rows], case)[0], read([rows], case, passes=False)[0]
+    assert list(whole.parameters) == ["range_bias_1"] and not live.parameters and BIASES not in live.assumed
+
+
+@pytest.mark.parametrize("option", ["estimate", "consider"])
+def test_what_no_orbit_has_is_refused_before_one_is_looked_for(option, monkeypatch):
+    monkeypatch.setattr("piazzi.determination.determining.unguided", lambda *_: pytest.fail("looked for orbits"))
+    rows = ranges(np.arange(0.0, 1500.0, 300.0), np.zeros(5, dtype=int))
+    with pytest.raises(ValueError, match="'nonsense' is no unknown of these forces"):
+        prepared(rows, stations="ilrs", **{option: "nonsense=1"})
 
 
 def test_a_station_of_larger_biases_is_known_by_them_and_one_with_a_fault_is_not(given):

@@ -57,6 +57,7 @@ def test_the_same_functions_are_the_same_object_but_for_entries():
     ("old", "new", "kept"),
     [
         ("N = 6", "N = 7", {"Given", "double"}),
+        ("N = 6", "N, M = 6, 7", set()),
         ("2 * x", "3 * x", {"Given", "size", "later"}),
         ("size() * x", "size() - x", {"Given", "double", "size"}),
         ('"parameters"', '"parameters", "data"', {"double", "size", "both", "later"}),

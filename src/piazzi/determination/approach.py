@@ -67,7 +67,7 @@ def approached(given: Setup) -> Setup:
         whole = bool(rows.all())
         if there[rows].sum() >= ENOUGH or whole:
             near = given if whole else replace(given, tracking=part(given.tracking, rows), rows=given.rows[rows])
-            here = _place(near, begun, first)
+            here = _place(near, begun, first) or _place(near, begun, before)  # what fits few rows may not go through more
             if here is None:
                 return given
             here = _fitted(near, begun, here, unit, before, LONG if whole else SHORT)

@@ -13,7 +13,7 @@ import numpy as np
 
 from piazzi.determination.analysis import Analysis, analysed
 from piazzi.determination.departures import LEAST
-from piazzi.determination.instruments import with_instruments
+from piazzi.determination.instruments import station_of
 from piazzi.determination.passes import pass_of_rows
 from piazzi.determination.sensing import Measured
 from piazzi.determination.setup import Setup, renewed, scale_of
@@ -38,24 +38,19 @@ BIASES = (
 )
 
 
-def with_pass_biases(seen: Measured) -> Measured:
-    """The measurements with a bias for each pass of lasers, unless the user says what ranges are off by.
+def pass_biases(seen: Measured, wanted: Sequence[Asked]) -> list[Asked]:
+    """A bias for each pass of each laser whose ranges the user says nothing of.
 
     Residuals do not tell whether there are some: an arc of a few passes takes them up into the orbit, and what is left looks
     like noise.  So they are there before any residual is.
     """
-    if any(name.startswith("range_bias") for name in seen.parameters):
-        return seen
     laser = np.array([segment.wavelength is not None for segment in seen.observations.segments], dtype=np.bool_)
     first = seen.rows[:, 0]
     own = (first >= 0) & laser[seen.observations.segment[np.maximum(first, 0)]]
+    said = {named.casefold() for one in wanted if (named := station_of(one, "range")) is not None}
     labels = sorted({seen.labels[name] for name in seen.tracking.row_stations[own].tolist()})
-    if not labels:
-        return seen
-    found = with_instruments(
-        seen, [Asked(Estimated(f"bias.range.{n}", PASS, LASER), "estimated", "--estimate") for n in labels]
-    )
-    return replace(found, assumed=(*seen.assumed, BIASES))
+    left = [label for label in labels if said.isdisjoint(("", label.casefold()))]
+    return [Asked(Estimated(f"bias.range.{label}", PASS, LASER), "estimated", "--estimate") for label in left]
 
 
 def with_wider_biases(given: Setup) -> Setup:
@@ -63,8 +58,8 @@ def with_wider_biases(given: Setup) -> Setup:
     if BIASES not in given.assumed or not np.isfinite(given.states).all():
         return given
     seen = given.measured
-    biases = _of_stations(seen, [name for name in seen.parameters if name.startswith("range_bias")])
-    wider = _wider(given, biases)
+    usual = [name for name, (_, prior) in seen.parameters.items() if name.startswith("range_bias") and _is_usual(prior)]
+    wider = _wider(given, biases := _of_stations(seen, usual))
     if not wider:
         return given
     known = {name: wider[label] for label, names in biases.items() if label in wider for name in names}
@@ -73,6 +68,11 @@ def with_wider_biases(given: Setup) -> Setup:
     text = f"{BIASES}; +- {told}, where they are larger than that allows"
     found = renewed(given, replace(seen, parameters=parameters), given.chosen)
     return replace(found, assumed=tuple(text if one == BIASES else one for one in given.assumed))
+
+
+def _is_usual(prior: Gaussian) -> bool:
+    """Whether a bias has the sigma of `pass_biases`, and no user's."""
+    return float(np.ravel(prior.covariance)[0]) == LASER**2
 
 
 def _of_stations(seen: Measured, names: Sequence[str]) -> dict[str, list[str]]:

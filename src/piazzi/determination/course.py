@@ -181,7 +181,6 @@ def _of_document(facts: Mapping[str, Any], source: str) -> Course:
     varies, air = chosen.air_varies, _estimated_air(names, dates, before)
     if varies is not None and air:
         mean, P = _with_density(dates, names, mean, P)
-        varies = varies._replace(sigma=float(before[air[0]][1]))
         chosen = _with_departure(replace(chosen, air_varies=varies), air, varies)
     own = [p for p in (*chosen.forces.parameters, *air) if p in before and p in names]
     roles = {p: role for p, role in chosen.roles.items() if p in own} | dict.fromkeys(own, "estimated")

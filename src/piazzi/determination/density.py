@@ -1,15 +1,16 @@
 """How far the density of the air departs from that of its model: over the measurements, and behind them.
 
 Density varies with the Sun and the geomagnetic field in ways that no model follows.  The logarithm of what it is over that of
-its model is a first-order Gauss-Markov process: models are judged by ratios of densities (Bruinsma and Boniface 2021, J. Space
-Weather Space Clim. 11, 47), and a density is positive.  Its mean is minus half its variance, so that the mean density is that
-of the model.  Where drag moves an orbit by more than a tenth of what its measurements leave open, the process is estimated:
-its values at nodes that are equally far apart, from the first measurement or the orbit of before to the last, are made of
-independent numbers of unit variance, and between them it is linear; there are as many as measurements tell apart.  Beside it
-stand sine and cosine of the argument of latitude, as models differ most in how much more air there is by day than by night.
-The coefficient of drag is log-normal too, of the mean and sigma that it has before.  So an orbit stays one arc, which the
-first state and constants determine.  Behind the last node the mean of the density goes back to that of the model, and what it
-may have become meanwhile is added to covariances by the derivatives of the state by the coefficient of drag.
+its model is a first-order Gauss-Markov process: models are judged by ratios of densities (Bruinsma and Boniface 2021, J.
+Space Weather Space Clim.  11, 47), and a density is positive.  Its mean is minus half its variance, so that the mean density
+is that of the model, but for the waves.  Where drag moves an orbit by more than a tenth of what its measurements leave open,
+the process is estimated: its values at nodes that are equally far apart, from the first measurement or the orbit of before to
+the last, are made of independent numbers of unit variance, and between them it is linear; there are as many as measurements
+tell apart.  Beside it stand sine and cosine of the argument of latitude, as models differ most in how much more air there is
+by day than by night.  The coefficient of drag is log-normal too, of the mean and sigma that it has before.  So an orbit stays
+one arc, which the first state and constants determine.  Waves are of the same sigma, their mean is zero.  Behind the last node
+the mean of the density goes back to that of the model, and what it may have become meanwhile is added to covariances by the
+derivatives of the state by the coefficient of drag.
 """
 
 from __future__ import annotations

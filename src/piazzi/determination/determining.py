@@ -17,7 +17,7 @@ from piazzi.determination.approach import approached, refined
 from piazzi.determination.burns import burns_of
 from piazzi.determination.case import Case
 from piazzi.determination.case_file import split
-from piazzi.determination.common import with_pass_biases, with_wider_biases
+from piazzi.determination.common import BIASES, pass_biases, with_wider_biases
 from piazzi.determination.density import with_density
 from piazzi.determination.earlier import Earlier, earlier_of, fresh
 from piazzi.determination.editing import edited
@@ -170,8 +170,13 @@ def fitting_orbits(*tracking: Any, case: Case | None = None, **words: Any) -> In
     return initial_orbits(posed(seen, chosen(first := first_look(seen), still=True), first), seen.tracking)
 
 
-def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[..., Chosen], Guess | None, Earlier | None]:
-    """What was measured, the forces on an orbit (`still`: without processes), where to begin if said, the orbit of before."""
+def read(
+    files: Sequence[Any], case: Case, passes: bool = True
+) -> tuple[Measured, Callable[..., Chosen], Guess | None, Earlier | None]:
+    """What was measured, the forces on an orbit (`still`: without processes), where to begin if said, the orbit of before.
+
+    Lasers have a bias for each of their `passes`, unless more rows may come.
+    """
     wanted, burns = asked(case.estimate, case.consider), burns_of(case.manoeuvre)
     partners = partners_of(case.participant)
     everything = observations_of(files, case.answers)
@@ -182,7 +187,10 @@ def read(files: Sequence[Any], case: Case) -> tuple[Measured, Callable[..., Chos
     if seen.about != "sun":
         check_forces(case.forces)  # an orbit that they are for may be long in coming
     seen = oriented(seen, orientation_of(case.forces))
-    seen = with_pass_biases(with_instruments(seen, [one for one in wanted if one.what.kind in INSTRUMENTS]))
+    own = [one for one in wanted if one.what.kind in INSTRUMENTS]
+    common = pass_biases(seen, own) if passes else []
+    seen = with_instruments(seen, [*own, *common])
+    seen = replace(seen, assumed=(*seen.assumed, BIASES)) if common else seen
 
     def chosen(orbit: Guess, still: bool = False) -> Chosen:
         if seen.about == "sun":

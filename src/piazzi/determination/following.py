@@ -136,7 +136,7 @@ class Following:
 
     def _begun(self, rows: Observations, last: bool) -> list[Taken]:
         """An orbit of the first rows, or of the prior; nothing while they do not determine one."""
-        seen, chosen, guess, earlier = read([rows], self._told())
+        seen, chosen, guess, earlier = read([rows], self._told(), passes=False)
         count = int(np.isfinite(seen.tracking.values).sum())
         if earlier is None and not last and count < 2 * self._tried:
             self.waiting = f"{count} values do not determine an orbit yet"
@@ -144,7 +144,7 @@ class Following:
         self._tried = count
         keep, reasons = np.ones(len(seen.tracking.values), dtype=np.bool_), np.full(len(seen.tracking.values), "", dtype=object)
         try:
-            begin = guess or unguided(seen, lambda first: posed(seen, chosen(first), first))
+            begin = guess or unguided(seen, lambda first: posed(seen, chosen(first, still=True), first))
             given = approached(setup(seen, self._with_air(rows, chosen, begin), begin, earlier=earlier))
             if earlier is None:
                 self.announce("determining")
@@ -167,7 +167,7 @@ class Following:
         if air is None or said:
             return found
         told = [*listed(self.case.estimate), Estimated("cd", f"~{air.time:.0f}s", air.sigma)]
-        found = read([rows], replace(self._told(), estimate=told))[1](begin)
+        found = read([rows], replace(self._told(), estimate=told), passes=False)[1](begin)
         text = f"density of the air departs by {air.sigma:.0%}, correlated over {air.time / 3600.0:.3g} h"
         return replace(found, assumed=(*found.assumed, text))
 

@@ -125,6 +125,12 @@ def _parts(one: Asked) -> tuple[str, str]:
     return ("range_rate" if kind == "range_rate_averaged" else kind), station
 
 
+def station_of(one: Asked, kind: str) -> str | None:
+    """The station whose measurements of a kind have this bias, "" for all of them, None for what is no bias of that kind."""
+    own, station = _parts(one)
+    return station if one.what.kind == BIAS and own == kind else None
+
+
 def _numbers(seen: Measured, sensor: str) -> Mapping[str, float]:
     return dict(getattr(next(s for s in seen.sensors if s.name == sensor), "defaults", ()))
 

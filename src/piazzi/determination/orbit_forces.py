@@ -27,7 +27,7 @@ COEFFICIENTS = {"cr": "cr_a_m", "cd": "cd_a_m"}
 
 
 class AirVaries(NamedTuple):
-    """By which share density departs from that of a fit, and over how many seconds it stays so."""
+    """Sigma of the logarithm of the density over that of its model, and over how many seconds it stays so."""
 
     sigma: float
     time: float

@@ -128,9 +128,16 @@ def said(problem: Problem, mean: Array) -> tuple[Array, Array]:
 
 
 def believed(problem: Problem, name: str) -> tuple[float, float]:
-    """Value and sigma before the measurements of what is estimated or considered, as results have them."""
+    """Value and sigma before the measurements of what is estimated or considered, as results have them.
+
+    Of a coefficient whose logarithm is estimated they are its mean and sigma.
+    """
     if name in problem.model.names:
         i = problem.model.names.index(name)
+        if name.endswith(LOGARITHM):
+            m, P = float(problem.mean[i]), float(problem.covariance[i, i])
+            value = float(problem.parameters[said_name(name)] * np.exp(m + 0.5 * P))
+            return value, value * float(np.sqrt(np.expm1(P)))
         values, J = said(problem, problem.mean)
         return float(values[i]), float(np.sqrt(J[i] @ problem.covariance @ J[i]))
     given: Any = problem.parameters[name]

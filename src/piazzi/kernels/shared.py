@@ -38,6 +38,7 @@ def _keys(body: Iterable[ast.stmt], lines: list[str]) -> Mapping[str, str]:
     """By name of what may be shared, a hash of its own text and of all that it reaches."""
     texts, needs = dict[str, str](), dict[str, set[str]]()
     entries = set[str]()
+    rest = ""  # what else runs there, such as `a, b = 1, 2` of a user's own code: any function may need it
     for node in body:
         first = min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
         for name in _defined(node):
@@ -45,16 +46,18 @@ def _keys(body: Iterable[ast.stmt], lines: list[str]) -> Mapping[str, str]:
             needs[name] = needed(node)
         if isinstance(node, ast.FunctionDef) and is_entry(node):
             entries.add(node.name)
-    return {name: _key(name, texts, needs) for name in texts.keys() - entries}
+        if not _defined(node) and not isinstance(node, ast.Import | ast.ImportFrom | ast.Expr):
+            rest += "\n".join(lines[first - 1 : node.end_lineno])
+    return {name: _key(name, texts, needs, rest) for name in texts.keys() - entries}
 
 
-def _key(name: str, texts: Mapping[str, str], needs: Mapping[str, set[str]]) -> str:
+def _key(name: str, texts: Mapping[str, str], needs: Mapping[str, set[str]], rest: str) -> str:
     found, waiting = {name}, [name]
     while waiting:
         new = (needs[waiting.pop()] & texts.keys()) - found
         found |= new
         waiting += new
-    return hashlib.sha256(repr([name, *((n, texts[n]) for n in sorted(found))]).encode()).hexdigest()
+    return hashlib.sha256(repr([name, rest, *((n, texts[n]) for n in sorted(found))]).encode()).hexdigest()
 
 
 def _defined(node: ast.stmt) -> set[str]:

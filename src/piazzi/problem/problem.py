@@ -226,6 +226,7 @@ class Problem(Shown):
         """The same with another belief in its states: what else it is made of was checked when it was made.
 
         Whether equations have values at the new mean is not asked: it is for states of an orbit that was followed to there.
+        Tables of functions are shared, and widened for both.
         """
         if prior_time is not None and not isfinite(prior_time):
             raise ValueError(f"prior_time is {prior_time}; it must be finite")
