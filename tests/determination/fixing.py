@@ -30,7 +30,7 @@ def observations(position, t, sigma, frame="GCRF", name="SAT", epoch=EPOCH, **to
 
 def truth(t):
     """States (K, 6) at times (K,) s past `EPOCH` of the orbit that starts at `STATE`, by steps of order 8 of 30 s."""
-    forces = earth.Forces(degree=12, radiation="cannonball")
+    forces = earth.Forces(degree=12, tides=("solid", "k1"), radiation="cannonball")
     model = forces.model([pz.Sensor("position", {"px": "x", "py": "y", "pz": "z"})], {"cr_a_m": "estimated"})
     problem = pz.Problem(
         model,
