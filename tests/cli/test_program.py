@@ -22,7 +22,7 @@ def test_stdout_holds_json_and_nothing_else_while_compiling_in_a_folder_of_last_
     assert result.document["rows"][0]["success"]
     lines = result.err.splitlines()
     assert sum(line.startswith("piazzi: warning: no private, writable folder") for line in lines) == 1
-    assert sum(line.startswith("piazzi: compiling") for line in lines) == len(lines) - 1 > 0
+    assert sum(line.startswith("piazzi: compiling") for line in lines) == len(lines) - 1 == 1  # however many kernels
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["estimate", "--nothing"]])

@@ -133,14 +133,18 @@ def _show_warning(held: list[str], message: Warning | str, category: type[Warnin
 
 
 class _Lines(logging.Handler):
-    """Log records as lines on stderr: those of compilation at once, others as `_show_warning` holds what is put right."""
+    """Log records as lines on stderr: one for all that compiles, others as `_show_warning` holds what is put right."""
 
     def __init__(self, held: list[str]) -> None:
         super().__init__()
-        self._held = held
+        self._held, self._told = held, False
 
     def emit(self, record: logging.LogRecord) -> None:
-        if record.name.startswith("piazzi.kernels"):
-            say(record.getMessage())
-        else:
-            self._held.append(record.getMessage())
+        text = record.getMessage()
+        if not record.name.startswith("piazzi.kernels"):
+            self._held.append(text)
+        elif not text.startswith("compiling"):
+            say(text)
+        elif not self._told:
+            self._told = True
+            say("compiling what this kind of problem needs, once: seconds to a few minutes, later runs load it ...")
