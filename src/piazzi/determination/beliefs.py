@@ -81,11 +81,7 @@ def carried_to(problem: Problem, step: float, start: float, x: Array, P: Array, 
             nodes += np.linspace(nodes[-1], when, parts + 1)[1:].tolist()
         marks.append(len(nodes) - 1)
     states, Phi = follow(problem, np.array(nodes), x, step)
-    total, now = {0: np.eye(len(x))}, np.eye(len(x))
-    for i, one in enumerate(Phi, start=1):
-        now = one @ now
-        total[i] = now
     where = np.searchsorted(order if t[0] >= start else -order, t if t[0] >= start else -t)
     at = [marks[i] for i in where]
-    W = np.stack([total[i] for i in at])
+    W = products(Phi)[at]
     return states[at], W @ P @ np.swapaxes(W, 1, 2)
