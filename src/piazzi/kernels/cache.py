@@ -17,8 +17,8 @@ from piazzi.kernels.apart import entry_name, symbol
 from piazzi.kernels.build import UNKNOWN_INSIDE, compile_entries, live_entries, look_for_garbage, note_source, plain_entries
 from piazzi.kernels.folder import Folder, private_folder, writable_folder
 from piazzi.kernels.library import load_objects, say_where
-from piazzi.kernels.spec import KernelSpec, fragment_file, tried
-from piazzi.kernels.store import Kept, keep_where_possible, kept_in
+from piazzi.kernels.spec import KernelSpec, fragment_file, text_digest, tried
+from piazzi.kernels.store import Kept, keep_where_possible, kept_in, kept_of_text
 
 LOGGER = logging.getLogger("piazzi.kernels")
 _spent: list[float] = []
@@ -125,21 +125,29 @@ def _bind(spec: KernelSpec, calls: Iterable[str]) -> None:
 
 
 def _build(spec: KernelSpec, place: Folder | None, digest: str) -> dict[str, Any]:
-    """Compile, and keep what came of it where that can be done."""
+    """Compile, and load what came of it."""
     source, calls = spec.parts("compiled")
     try:
-        kept = Kept(*compile_entries(source), calls)
+        kept = _compiled(place, digest, source, calls)
     except UNKNOWN_INSIDE as error:
         _bind(spec, calls)
         return _built_publicly(source, spec.sizes, error)
-    keep_where_possible(place, digest, source, kept)
     return _bound(spec, kept)
+
+
+def _compiled(place: Folder | None, digest: str, source: str, calls: list[str]) -> Kept:
+    """What the source gives, kept under this name where that can be done: compiled, unless a model of other names had it."""
+    text = text_digest(source, calls)
+    kept = kept_of_text(place, text) if place else None
+    if kept is None:
+        kept = Kept(*compile_entries(source), calls, text)
+    keep_where_possible(place, digest, source, kept)
+    return kept
 
 
 def make(spec: KernelSpec) -> None:
     """Compile a module and keep it on disk, for other processes."""
-    source, calls = spec.parts("compiled")
-    keep_where_possible(writable_folder(), spec.digest(), source, Kept(*compile_entries(source), calls))
+    _compiled(writable_folder(), spec.digest(), *spec.parts("compiled"))
 
 
 def missing(specs: Iterable[KernelSpec]) -> list[KernelSpec]:

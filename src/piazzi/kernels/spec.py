@@ -117,6 +117,11 @@ class KernelSpec:
         return _module_of(unit, self.model, self.scheme, self.apart, self.lanes if UNITS[unit].lanes else 1)
 
 
+def text_digest(source: str, calls: list[str]) -> str:
+    """Hash of a source with what it calls, and of all else that its object code depends on."""
+    return hashlib.sha256(repr((source, calls, _surroundings())).encode()).hexdigest()
+
+
 @lru_cache(maxsize=MOST_UNITS)
 def _module_of(unit: str, model: Model, scheme: tuple[Any, ...], apart: Apart, lanes: int) -> KernelSpec:
     part = UNITS[unit].part

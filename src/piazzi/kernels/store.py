@@ -8,6 +8,7 @@ import json
 import logging
 import os
 import time
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from piazzi.kernels.folder import Folder
@@ -15,14 +16,16 @@ from piazzi.kernels.settings import may_be_kept
 
 LOGGER = logging.getLogger("piazzi.kernels")
 MANIFEST = "manifest.json"
+_texts: dict[tuple[Path, str], str] = {}  # of finished folders that were looked at
 
 
 class Kept(NamedTuple):
-    """What a finished folder holds: object files, their symbols with what they take, and the units that they call."""
+    """What a finished folder holds: object files, their symbols with what they take, units that they call, a hash of the text."""
 
     objects: dict[str, bytes]
     symbols: dict[str, tuple[str, tuple[str, ...]]]
     calls: list[str]
+    text: str
 
 
 def kept_in(place: Folder, digest: str) -> Kept | None:
@@ -38,14 +41,31 @@ def kept_in(place: Folder, digest: str) -> Kept | None:
         symbols = {name: (symbol, tuple(kinds)) for name, (symbol, kinds) in manifest["symbols"].items()}
         if manifest["seal"] != _seal(manifest, digest):
             return None
-        return Kept(objects, symbols, manifest["calls"])
+        return Kept(objects, symbols, manifest["calls"], manifest["text"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 
 
+def kept_of_text(place: Folder, text: str) -> Kept | None:
+    """What was compiled of the same text, which models whose names differ have in common; None where nothing was."""
+    try:
+        there = [name for name in place.ages() if not name.startswith(".")]
+    except OSError:
+        return None
+    for digest in there:
+        at = place.path, digest
+        if at not in _texts:
+            with contextlib.suppress(OSError, ValueError, KeyError, TypeError, RecursionError), place.inside(digest) as home:
+                _texts[at] = json.loads(home.read(MANIFEST))["text"]
+        kept = kept_in(place, digest) if _texts.get(at) == text else None
+        if kept is not None and kept.text == text:
+            return kept
+    return None
+
+
 def _seal(manifest: dict[str, Any], digest: str) -> str:
     """Checksum of the manifest itself, and of whose it is: its symbols and kinds decide how the code is called."""
-    body = json.dumps([digest, manifest["objects"], manifest["symbols"], manifest["calls"]], sort_keys=True)
+    body = json.dumps([digest, *(manifest[name] for name in ("objects", "symbols", "calls", "text"))], sort_keys=True)
     return hashlib.sha256(body.encode()).hexdigest()
 
 
@@ -72,6 +92,7 @@ def _keep(place: Folder, digest: str, source: str, kept: Kept) -> None:
                 "objects": {n: hashlib.sha256(c).hexdigest() for n, c in kept.objects.items()},
                 "symbols": kept.symbols,
                 "calls": kept.calls,
+                "text": kept.text,
             }
             seal = _seal(json.loads(json.dumps(manifest)), digest)
             home.write(MANIFEST, json.dumps(manifest | {"seal": seal}).encode())
