@@ -20,7 +20,7 @@ _texts: dict[tuple[Path, str], str] = {}  # of finished folders that were looked
 
 
 class Kept(NamedTuple):
-    """What a finished folder holds: object files, their symbols with what they take, units that they call, a hash of the text."""
+    """What a finished folder holds: object files, their symbols with what they take, units that are called, the text's hash."""
 
     objects: dict[str, bytes]
     symbols: dict[str, tuple[str, tuple[str, ...]]]
