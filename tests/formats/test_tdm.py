@@ -305,7 +305,9 @@ def test_lines_of_any_order_and_size_are_those_of_a_plain_reader(tmp_path):
 def test_ranges_in_range_units_are_metres_once_their_length_is_said(data_dir):
     path = data_dir / "tdm" / "TDMExample4.txt"
     raw = pz.read_tracking(path)
-    assert any("--range-unit 0.28m" in text for text in raw.open) and any("range_ru=...RU" in text for text in raw.open)
+    assert any("--range-unit 0.28m" in text for text in raw.open) and any(
+        "of range_ru: --sigma ...m" in text for text in raw.open
+    )
     for said in ("0.25m", "DSS-24=25cm", ["1m", "DSS-24=0.25 m"]):
         rows = pz.read_tracking(path, range_unit=said, range="two-way")
         there = raw.of_kind("range_ru")
@@ -315,7 +317,7 @@ def test_ranges_in_range_units_are_metres_once_their_length_is_said(data_dir):
         assert rows.segments[0].range_modulus == 0.25 * 2e26
         assert rows.segments[0].corrections == (Correction("range", 0.25 * 46.7741, True),)
         assert not any("RU" in text or "unit" in text for text in rows.open)
-        assert any("range=...m" in text for text in rows.open)
+        assert any("of range: --sigma ...m" in text for text in rows.open)
     assert_allclose(pz.read_tracking(path, range_unit="0.25m", sigma="range=3m").sigma[there], 3.0)
     for said, what in (("3 kg", "is a length"), ("short", "is a length"), ("-1m", "is a length"), ("X=1m", "no such station")):
         with pytest.raises(ValueError, match=what):

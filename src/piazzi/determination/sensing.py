@@ -24,7 +24,8 @@ from piazzi.determination.sites import Context, sites_of, with_station_sigmas
 from piazzi.determination.unknowns import Label
 from piazzi.earth import Epoch
 from piazzi.earth.scales import Orientation
-from piazzi.formats import KINDS, Observations
+from piazzi.formats import Observations
+from piazzi.formats.kinds import asked_sigmas
 from piazzi.model import Sensor
 from piazzi.problem import Station, Tracking
 from piazzi.problem.checks import Array
@@ -205,11 +206,7 @@ def _check_sigmas(observations: Observations, index: Array) -> None:
     lost = np.isnan(observations.sigma[index])
     if lost.any():
         kinds = dict.fromkeys(observations.kinds[k] for k in observations.kind[index[lost]])
-        kind = next(iter(kinds))
-        unit = KINDS[kind].unit
-        raise ValueError(
-            f"{_where(observations)}standard deviations of {', '.join(kinds)}: say them, as in --sigma {kind}=10{unit}"
-        )
+        raise ValueError(f"{_where(observations)}left open by the file: {asked_sigmas(kinds)}")
 
 
 def of_object(observations: Observations, chosen: str | None) -> Observations:
@@ -232,12 +229,14 @@ def of_object(observations: Observations, chosen: str | None) -> Observations:
 
 
 def _ask(observations: Observations) -> None:
-    """Raise ValueError for what is open."""
-    known = not np.isnan(observations.sigma[observations.measured & observations.used]).any()
-    waiting = [text for text in observations.open if "--" in text and not (known and "--sigma" in text)]
+    """Raise ValueError for all that is open; standard deviations are of those kinds that have none yet."""
+    lost = observations.measured & observations.used & np.isnan(observations.sigma)
+    kinds = [observations.kinds[i] for i in np.unique(observations.kind[lost])]
+    waiting = [_plain(text) for text in observations.open if "--" in text and "--sigma" not in text]
+    if kinds and any("--sigma" in text for text in observations.open):
+        waiting.append(asked_sigmas(kinds))
     if waiting:
-        more = f" (and {len(waiting) - 1} more: piazzi tracking lists them)" if len(waiting) > 1 else ""
-        raise ValueError(f"{_where(observations)}left open by the file: {_plain(waiting[0])}{more}")
+        raise ValueError(f"{_where(observations)}left open by the file: {'; '.join(waiting)}")
 
 
 def _plain(text: str) -> str:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.fields import day_of_year, integer, second_of_day
+from piazzi.formats.kinds import asked_sigmas
 from piazzi.formats.observations import Observations
 from piazzi.formats.rows import Row, Rows
 
@@ -70,8 +71,7 @@ def said_of(rows: Rows, shifts: dict[int, int], mend: bool, told: Conventions) -
     if "right_ascension" in measured:
         left_open.append("what directions are reduced to: --angles astrometric, --angles geocentric or --angles apparent")
         left_open.append("the axes of right ascension and declination: --frame EME2000")
-    unit = {"range": "m", "range_rate": "m/s"}
-    left_open.append(f"standard deviations of {', '.join(measured)}: --sigma {measured[0]}=...{unit.get(measured[0], 'rad')}")
+    left_open.append(asked_sigmas(measured))
     return tuple(assumed), tuple(left_open)
 
 

@@ -10,6 +10,7 @@ from piazzi.arrays import Array
 from piazzi.formats.conventions import Conventions, with_usual_sigmas
 from piazzi.formats.ephemeris import Arc, Ephemeris
 from piazzi.formats.joining import concatenate
+from piazzi.formats.kinds import asked_sigmas
 from piazzi.formats.observations import Observations, Segment
 
 POSITION, VELOCITY = ("x", "y", "z"), ("vx", "vy", "vz")
@@ -36,8 +37,8 @@ def fixes_of(ephemeris: Ephemeris, told: Conventions) -> Observations:
             replace(rows, assumed=ephemeris.assumed), told, usual, f"sigma of positions of {ephemeris.format}: {usual} m"
         )
         return replace(rows, open=ephemeris.open, left_out=left_out)
-    known = [bool(np.isfinite(rows.sigma[rows.segment == i]).all()) for i in range(len(rows.segments))]
-    open_ = ephemeris.open if all(known) else (*ephemeris.open, "standard deviations of fixes: --sigma x=...m")
+    lacking = [rows.kinds[i] for i in np.unique(rows.kind[np.isnan(rows.sigma)])]
+    open_ = (*ephemeris.open, asked_sigmas(lacking)) if lacking else ephemeris.open
     return replace(rows, assumed=ephemeris.assumed, open=open_, left_out=left_out)
 
 

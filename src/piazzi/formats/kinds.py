@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 
@@ -65,5 +65,15 @@ KINDS: Mapping[str, Kind] = {
     "carrier_to_noise": Kind("dBHz", True),
     "ranging_to_noise": Kind("dBHz", True),
 }
+
+
+def asked_sigmas(kinds: Iterable[str]) -> str:
+    """Words that ask for the standard deviations of these kinds, one for each unit, and name the option."""
+    names = list(kinds)
+    written = {"rad": "...deg", "RU": "...m", "cycle": "..."}
+    sigmas = dict.fromkeys(written.get(KINDS[name].unit, f"...{KINDS[name].unit}") for name in names)
+    return f"standard deviations of {', '.join(names)}: {' '.join(f'--sigma {sigma}' for sigma in sigmas)}"
+
+
 TAGS = ("", "transmit", "bounce", "receive")
 ANGLES = ("astrometric", "geocentric", "apparent")

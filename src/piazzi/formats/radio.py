@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from piazzi.earth.dates import read_date
 from piazzi.formats.conventions import Conventions
 from piazzi.formats.fields import number
+from piazzi.formats.kinds import asked_sigmas
 from piazzi.formats.observations import Observations
 from piazzi.formats.rows import Row, Rows
 
@@ -26,7 +27,7 @@ def read(data: bytes, name: str, told: Conventions) -> Observations:
             fields = _SHORT.sub(r"20\1-\2-\3T", text.strip(), count=1).split()
             if fields and not fields[0].startswith("#"):
                 _row(rows, fields, segment, line)
-        return rows.table(name, (), ("standard deviations of receive_frequency: --sigma receive_frequency=...Hz",))
+        return rows.table(name, (), (asked_sigmas(["receive_frequency"]),))
     except ValueError as error:
         raise ValueError(f"{name}: line {line}: {error}") from None
 

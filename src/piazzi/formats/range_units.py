@@ -64,7 +64,7 @@ def in_metres(observations: Observations, told: Mapping[str, float], partial: bo
 
 
 def _said(text: str) -> str:
-    return text.replace(f"{RU}=...RU", f"{RANGE}=...m").replace(RU, RANGE)
+    return text.replace(RU, RANGE)
 
 
 def _turned(segment: Segment, factors: np.ndarray) -> Segment:

@@ -12,7 +12,7 @@ import numpy as np
 
 from piazzi.arrays import Array
 from piazzi.formats.conventions import WORDS, Conventions, with_conventions
-from piazzi.formats.kinds import KINDS
+from piazzi.formats.kinds import KINDS, asked_sigmas
 from piazzi.formats.observations import Observations, Segment
 from piazzi.formats.table_header import FIX, LATITUDE, PEOPLE, SIGMA, WEATHER, Header, content_of
 from piazzi.formats.table_times import clocks
@@ -176,5 +176,5 @@ def _open(
         out.append("the axes of x, y and z: --frame ITRF")
     silent = [c.kind for i, c in enumerate(columns) if not KINDS[c.kind].auxiliary and np.isnan(c.sigma[there[:, i]]).any()]
     if silent:
-        out.append(f"standard deviations of {', '.join(silent)}: --sigma {silent[0]}=...{KINDS[silent[0]].unit}")
+        out.append(asked_sigmas(silent))
     return out

@@ -13,7 +13,7 @@ from piazzi.earth.scales import UTC_BEGINS
 from piazzi.formats.columns import coded, read_numbers
 from piazzi.formats.dates import instants, read_dates
 from piazzi.formats.frames import KNOWN
-from piazzi.formats.kinds import KINDS, TAGS
+from piazzi.formats.kinds import KINDS, TAGS, asked_sigmas
 from piazzi.formats.ndm import Item, Source, shown
 from piazzi.formats.observations import Observations, Segment
 from piazzi.formats.tdm_segment import Meaning, Row, check_texts
@@ -178,6 +178,5 @@ def open_of(segments: Sequence[Segment], present: Mapping[str, int]) -> tuple[st
         out.append("at how many cycles the Doppler counter rolled over, which the message has no keyword for")
     measured = sorted(kind for kind in kinds if not KINDS[kind].auxiliary)
     if measured:
-        first = measured[0]
-        out.append(f"standard deviations of {', '.join(measured)}: --sigma {first}=...{KINDS[first].unit}")
+        out.append(asked_sigmas(measured))
     return tuple(out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -74,5 +75,7 @@ def barycentric_velocity(epochs: list[Epoch]) -> Array:
     import erfa
 
     one, two = np.array([epoch.jd("TDB") for epoch in epochs]).T
-    pv = erfa.epv00(one, two)[1]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", erfa.ErfaWarning)  # of dates before 1900: 1801 is good to mm/s, as `bodies` has it
+        pv = erfa.epv00(one, two)[1]
     return np.asarray(pv["v"]) * (149597870700.0 / DAY)
