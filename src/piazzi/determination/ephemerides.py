@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 SCHEMA = "piazzi.ephemeris/1"
 STEP = 60.0  # s
-MOST = 10**6  # rows
+MOST, SHOWN = 10**6, 60  # rows that are made, and that a terminal shows
 _FIRST_UTC = Epoch("1960-01-02T00:00:00 TT")
 _LIGHT = {"earth": "", "sun": "from the Sun\n[deg]"}
 UNITS = {
@@ -282,7 +282,7 @@ def _passes_grid(sky: Sky) -> Grid:
     return Grid(f"Passes: {len(rows)}", heads, tuple(rows))
 
 
-def _rows_grid(sky: Sky, most: int = 60) -> Grid:
+def _rows_grid(sky: Sky) -> Grid:
     c = sky.columns
     unit, metres, far = ("au", ASTRONOMICAL_UNIT, "{:.6f}") if sky.course.centre.name == "sun" else ("km", 1e3, "{:.3f}")
     heads = [
@@ -299,7 +299,7 @@ def _rows_grid(sky: Sky, most: int = 60) -> Grid:
     heads += ["3 sigma\n[arcsec]", "along\n[s]"] if "ellipse_major" in c else []
     heads += ["frequency\n[Hz]"] if "frequency" in c else []
     rows = []
-    for i in range(min(len(sky.t), most)):
+    for i in range(min(len(sky.t), SHOWN)):
         cells = [_clock(sky, float(sky.t[i])), f"{np.degrees(c['right_ascension'][i]):.4f}"]
         cells += [f"{np.degrees(c['declination'][i]):.4f}", _degrees(c["azimuth"][i]), _degrees(c["elevation"][i])]
         cells += [far.format(c["range"][i] / metres), f"{c['range_rate'][i] / 1e3:.4f}", _motion(float(c["rate"][i]))]
@@ -309,5 +309,5 @@ def _rows_grid(sky: Sky, most: int = 60) -> Grid:
             cells += [axes, number(c["along_track_sigma"][i], 2)]
         cells += [f"{c['frequency'][i]:.1f}"] if "frequency" in c else []
         rows.append(tuple(cells))
-    more = f", the first {most} of {len(sky.t):,}" if len(sky.t) > most else ""
+    more = f", the first {SHOWN} of {len(sky.t):,}" if len(sky.t) > SHOWN else ""
     return Grid(f"Ephemeris{more}", tuple(heads), tuple(rows))

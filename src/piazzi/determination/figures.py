@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piazzi.determination.orbit import TILT
 from piazzi.determination.page.charts import RTN, passes_of, spans
-from piazzi.determination.page.ecliptic import FARTHEST, TO_ECLIPTIC, ellipse
+from piazzi.determination.page.ecliptic import FARTHEST, ellipse
 from piazzi.determination.page.places import station_rows
 from piazzi.determination.page.sampled import Sampled, sampled
 from piazzi.determination.residuals import table
@@ -196,7 +197,7 @@ def _lines(path: Sampled, mu: float) -> tuple[list[tuple[Array, Any]], float, st
         place = path.mean[:, :3] / 1e6
         return [(place, {"color": _BLUE, "lw": 0.8})], 1.08 * max(_RADIUS / 1e6, float(np.abs(place).max())), "1000 km"
     whole = ellipse(path.mean[len(path.mean) // 2], mu)
-    place, own = (line @ TO_ECLIPTIC.T / ASTRONOMICAL_UNIT for line in (path.mean[:, :3], whole))
+    place, own = (line @ TILT.T / ASTRONOMICAL_UNIT for line in (path.mean[:, :3], whole))
     earth = np.column_stack([UNIT_CIRCLE, np.zeros(len(UNIT_CIRCLE))])
     lines = [(earth, {"color": MEASURED, "lw": 0.5}), (place, {"color": _BLUE, "lw": 1.4})]
     if len(own) and np.abs(own).max() < FARTHEST * np.abs(place).max():

@@ -21,12 +21,12 @@ KEPLERIAN = ("a", "e", "i", "raan", "argp", "nu")
 UNITS = ("m", "", "rad", "rad", "rad", "rad")
 ECLIPTIC = "ecliptic J2000"  # axes of elements about the Sun
 OBLIQUITY = np.radians(84381.448 / 3600.0)  # of J2000, IAU 1976, as ephemerides of minor planets have it
-_TILT = np.array([
+TILT = np.array([
     [1.0, 0.0, 0.0],
     [0.0, np.cos(OBLIQUITY), np.sin(OBLIQUITY)],
     [0.0, -np.sin(OBLIQUITY), np.cos(OBLIQUITY)],
 ])  # fmt: skip
-TO_ECLIPTIC = np.kron(np.eye(2), _TILT)  # of states on the axes of EME2000
+TO_ECLIPTIC = np.kron(np.eye(2), TILT)  # of states on the axes of EME2000
 Beliefs = Callable[[Sequence[Epoch]], tuple[Array, Array]]
 
 

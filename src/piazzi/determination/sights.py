@@ -28,6 +28,7 @@ FAR = 1e7  # m: where a body is put to ask a sensor what it adds
 PLACES = (("position_x", "position_y", "position_z"), ("px", "py", "pz"))
 PAIRS = (("azimuth", "elevation"), ("x_east", "y_north"), ("x_south", "y_east"), ("right_ascension", "declination"))
 ROUNDS = 3
+MOST_ROWS = 600  # of a station
 LONG = 60 * 86400.0  # s: of rows spread more thinly each instant is worked out by itself
 
 
@@ -45,8 +46,8 @@ class Sights:
         return next(s for s in self.sensors if s.name == station.sensor)
 
 
-def rows_of(problem: Problem, tracking: Tracking, most: int = 600) -> tuple[Rows, Array]:
-    """At most so many rows of each station as vectors, and for each the row of the tracking.
+def rows_of(problem: Problem, tracking: Tracking) -> tuple[Rows, Array]:
+    """At most `MOST_ROWS` of each station as vectors, and for each the row of the tracking.
 
     Raises
     ------
@@ -54,25 +55,23 @@ def rows_of(problem: Problem, tracking: Tracking, most: int = 600) -> tuple[Rows
         Where no sensor measures a distance, its rate, a direction or a position.
     """
     given = Sights(problem.model.sensors, problem.stations, problem.epoch, problem)
-    return _joined(given, tracking, tracking.stations_of(problem), most)
+    return _joined(given, tracking, tracking.stations_of(problem))
 
 
-def plain_rows(
-    sensors: Sequence[Sensor], stations: Sequence[Station], epoch: Epoch, tracking: Tracking, most: int = 600
-) -> tuple[Rows, Array]:
+def plain_rows(sensors: Sequence[Sensor], stations: Sequence[Station], epoch: Epoch, tracking: Tracking) -> tuple[Rows, Array]:
     """The same by geometry alone: axes and the annual aberration are taken out, air and biases are left in."""
     places = {station.name: s for s, station in enumerate(stations)}
     which = np.array([places[name] for name in tracking.row_stations])
-    return _joined(Sights(sensors, stations, epoch), tracking, which, most)
+    return _joined(Sights(sensors, stations, epoch), tracking, which)
 
 
-def _joined(given: Sights, tracking: Tracking, which: Array, most: int) -> tuple[Rows, Array]:
+def _joined(given: Sights, tracking: Tracking, which: Array) -> tuple[Rows, Array]:
     t, z = tracking.row_times, tracking.values
     found: list[tuple[Rows, Array]] = []
     for s, station in enumerate(given.stations):
         own = np.flatnonzero(which == s)
-        if len(own) > most:
-            own = own[np.unique(np.linspace(0, len(own) - 1, most).astype(int))]
+        if len(own) > MOST_ROWS:
+            own = own[np.unique(np.linspace(0, len(own) - 1, MOST_ROWS).astype(int))]
         if len(own):
             found += _of_station(given, station, t[own], z[own], own)
     if not found:

@@ -40,19 +40,19 @@ class Check:
         return bool(self.low <= self.statistic <= self.high)
 
 
-def chi_square_check(total: float, mean: float, variance: float, count: float, probability: float = PROBABILITY) -> Check:
+def chi_square_check(total: float, mean: float, variance: float, count: float) -> Check:
     """Two-sided test of a sum of `count` correlated chi-square values by its average.
 
     The sum is taken as a chi-square variable times a factor, with the mean and the variance that the sum has where the model
     holds (Satterthwaite, Biometrics Bulletin 2, 1946); exact for independent values.
     """
     factor, freedom = variance / (2 * mean), 2 * mean**2 / variance
-    tail = 0.5 * (1 - probability)
+    tail = 0.5 * (1 - PROBABILITY)
     low, high = (factor * quantile(p, freedom) / count for p in (tail, 1 - tail))
     return Check(total / count, low, high, count * 2 * mean / variance)
 
 
-def nees_check(value: Array, rank: Array, correlation: Array, probability: float = PROBABILITY) -> Check | None:
+def nees_check(value: Array, rank: Array, correlation: Array) -> Check | None:
     """Test of the mean NEES of one run, None where no error is known.
 
     Parameters
@@ -67,10 +67,10 @@ def nees_check(value: Array, rank: Array, correlation: Array, probability: float
         return None
     mean = float(rank.sum())
     variance = 2 * (mean + 2 * paired(correlation, known.astype(float)))
-    return chi_square_check(float(value[known].sum()), mean, variance, int(known.sum()), probability)
+    return chi_square_check(float(value[known].sum()), mean, variance, int(known.sum()))
 
 
-def nis_check(whitened: Array, rows: int, probability: float = PROBABILITY) -> Check | None:
+def nis_check(whitened: Array, rows: int) -> Check | None:
     """Test of the mean NIS per row; innovations of different epochs are independent where the model holds.
 
     Parameters
@@ -81,11 +81,11 @@ def nis_check(whitened: Array, rows: int, probability: float = PROBABILITY) -> C
     there = whitened[~np.isnan(whitened)]
     if not there.size or not rows:
         return None
-    return chi_square_check(float(there @ there), there.size, 2.0 * there.size, rows, probability)
+    return chi_square_check(float(there @ there), there.size, 2.0 * there.size, rows)
 
 
-def whiteness_check(series: Sequence[Array], lags: int = LAGS, probability: float = PROBABILITY) -> Check | None:
-    """Test that standardised innovations of one epoch do not tell those of the next, up to so many lags.
+def whiteness_check(series: Sequence[Array]) -> Check | None:
+    """Test that standardised innovations of one epoch do not tell those of the next, up to `LAGS` of them.
 
     Ljung and Box, Biometrika 65(2), 1978, summed over series (one for each component of each station); the mean is taken as
     zero, which innovations have, and missing values are left out pair by pair.  None where no series is long enough.
@@ -96,12 +96,12 @@ def whiteness_check(series: Sequence[Array], lags: int = LAGS, probability: floa
     """
     total, freedom = 0.0, 0
     for w in series:
-        found, count = _ljung_box(w, lags)
+        found, count = _ljung_box(w)
         total, freedom = total + found, freedom + count
-    return Check(total, 0.0, quantile(probability, freedom), freedom) if freedom else None
+    return Check(total, 0.0, quantile(PROBABILITY, freedom), freedom) if freedom else None
 
 
-def _ljung_box(w: Array, lags: int) -> tuple[float, int]:
+def _ljung_box(w: Array) -> tuple[float, int]:
     """The statistic and its degrees of freedom, zero for a series that is too short."""
     there = ~np.isnan(w)
     N = int(there.sum())
@@ -109,7 +109,7 @@ def _ljung_box(w: Array, lags: int) -> tuple[float, int]:
         return 0.0, 0
     w = np.where(there, w, 0.0)
     power, total, freedom = float(w @ w) / N, 0.0, 0
-    for lag in range(1, min(lags, N // 5) + 1):
+    for lag in range(1, min(LAGS, N // 5) + 1):
         pairs = int((there[lag:] & there[:-lag]).sum())
         if pairs >= _SHORTEST // 2 and power > 0:
             r = float(w[lag:] @ w[:-lag]) / (pairs * power)
@@ -118,7 +118,7 @@ def _ljung_box(w: Array, lags: int) -> tuple[float, int]:
     return total, freedom
 
 
-def bias_check(series: Sequence[Array], probability: float = PROBABILITY) -> Check | None:
+def bias_check(series: Sequence[Array]) -> Check | None:
     """Test that standardised innovations have mean zero, whatever their size: the sum of N mean^2 / power over series."""
     total, freedom = 0.0, 0
     for w in series:
@@ -127,7 +127,7 @@ def bias_check(series: Sequence[Array], probability: float = PROBABILITY) -> Che
         if len(there) >= _SHORTEST and power > 0:
             total += float(there.sum()) ** 2 / power
             freedom += 1
-    return Check(total, 0.0, quantile(probability, freedom), freedom) if freedom else None
+    return Check(total, 0.0, quantile(PROBABILITY, freedom), freedom) if freedom else None
 
 
 def epoch_bounds(rank: Array, runs: int = 1, probability: float = PROBABILITY) -> tuple[Array, Array]:

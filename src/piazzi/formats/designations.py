@@ -27,9 +27,9 @@ def _base62(text: str) -> int:
     return value
 
 
-def _to_base62(value: int, width: int) -> str:
+def _to_base62(value: int) -> str:
     out = ""
-    for _ in range(width):
+    for _ in range(4):
         value, digit = divmod(value, 62)
         out = _DIGITS[digit] + out
     return out
@@ -85,7 +85,7 @@ def pack(name: str) -> str:
         if number < 620000:
             return f"{_DIGITS[number // 10000]}{number % 10000:04d}".ljust(12)
         if number - 620000 < 62**4:
-            return f"~{_to_base62(number - 620000, 4)}".ljust(12)
+            return f"~{_to_base62(number - 620000)}".ljust(12)
     if match := re.fullmatch(r"(\d{1,4})([PD])(?:-([A-Z]{1,2}))?", name):
         return f"{int(match[1]):04d}{match[2]}" + (match[3] or "").lower().rjust(7)
     if match := re.fullmatch(r"([A-Z][a-z]+) (\d{1,3})", name):
@@ -105,7 +105,7 @@ def pack(name: str) -> str:
             return f"    {kind or ' '}{_year(match[1])}{match[2]}{_count(count)}{match[3]}"
         if not slash and match[1][:2] == "20" and (count - _CYCLES) * 25 + _ORDER.index(match[3]) < 62**4:
             sequence = (count - _CYCLES) * 25 + _ORDER.index(match[3])
-            return f"     _{_DIGITS[int(match[1][2:])]}{match[2]}{_to_base62(sequence, 4)}"
+            return f"     _{_DIGITS[int(match[1][2:])]}{match[2]}{_to_base62(sequence)}"
     raise ValueError(f"designation {name[:40]!r} cannot be packed")
 
 

@@ -9,22 +9,22 @@ import numpy as np
 from piazzi.arrays import Array
 from piazzi.orbit.initial import three_positions
 
+MOST_OFF_PLANE = np.radians(5.0)  # of the first position, off the plane of the others
 
-def gibbs(positions: Any, mu: float, most_off_plane: float = np.radians(5.0)) -> Array:
+
+def gibbs(positions: Any, mu: float) -> Array:
     """Velocity (3,) at the second of three positions (3, 3) of one orbit; no times are needed.
 
     Parameters
     ----------
     positions : in order of time; the farther apart, the better: below 1 degree take `herrick_gibbs`
     mu : gravitational parameter, in units that fit
-    most_off_plane : how far the first position may be off the plane of the others, rad
 
     Raises
     ------
     ValueError
-        For fewer than three positions, positions on one line through the centre, that are farther out of one plane,
-        or that no
-        conic about the centre passes through in that order.
+        For fewer than three positions, positions on one line through the centre, more than 5 degrees out of one
+        plane, or that no conic about the centre passes through in that order.
 
     Notes
     -----
@@ -36,7 +36,7 @@ def gibbs(positions: Any, mu: float, most_off_plane: float = np.radians(5.0)) ->
     if not min(np.linalg.norm(Z12) / (d[0] * d[1]), np.linalg.norm(Z23) / (d[1] * d[2])) > 1e-12:
         raise ValueError("two of the positions are on one line through the centre, which leaves the plane of the orbit open")
     off = np.arcsin(np.clip(r[0] @ Z23 / (d[0] * np.linalg.norm(Z23)), -1.0, 1.0))
-    if abs(off) > most_off_plane:
+    if abs(off) > MOST_OFF_PLANE:
         raise ValueError(f"the first position is {np.degrees(abs(off)):.3g} deg out of the plane of the others: no one orbit")
     N = d[0] * Z23 + d[1] * Z31 + d[2] * Z12
     D = Z12 + Z23 + Z31

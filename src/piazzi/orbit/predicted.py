@@ -48,8 +48,8 @@ def ephemeris_of(
     return Ephemeris(arcs=(arc,), format="OEM")
 
 
-def sigma_in_orbit(state: Array, covariance: Array, axes: str = "RTN") -> Array:
-    """Standard deviations (K, 6) along axes of the orbit."""
-    J = state_axes(state[:, :3], state[:, 3:], axes)
+def sigma_in_orbit(state: Array, covariance: Array) -> Array:
+    """Standard deviations (K, 6) along R, T and N."""
+    J = state_axes(state[:, :3], state[:, 3:], "RTN")
     P = J @ covariance @ np.swapaxes(J, 1, 2)
     return np.asarray(np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2), 0.0)))

@@ -22,6 +22,7 @@ from piazzi.orbit.two_body import propagate_kepler
 
 SAMPLES = {0: 1, 1: 64, 2: 512, 3: 2048, 4: 4096, 5: 8192, 6: 8192}
 LINKED = 4096  # pairs of distances
+SUBSETS = 12  # pairs or triples of rows for the classical methods
 SLOW = 2  # triples that the method of Gooding takes: a tenth of a second each
 _RATIOS = np.array([2.0, 3.0, 5.0, 7.0, 11.0, 13.0])
 
@@ -195,9 +196,9 @@ def _admissible(states: Array, region: Region) -> Array:
     return states[region.holds(states)]
 
 
-def classical(rows: Rows, epoch: float, region: Region, most: int = 12) -> Array:
+def classical(rows: Rows, epoch: float, region: Region) -> Array:
     """States (K, 6) at `epoch` by every classical method that the rows allow, on well-spread subsets."""
-    told = [*_by_positions(rows, region, most)] or _by_directions(rows, region, most)
+    told = [*_by_positions(rows, region)] or _by_directions(rows, region)
     found = [s for s in told if np.isfinite(s[1]).all()]
     if not found:
         return np.zeros((0, 6))
@@ -223,10 +224,10 @@ def places(rows: Rows) -> tuple[Array, Array]:
     return np.array(t)[order], np.array(r).reshape(-1, 3)[order]
 
 
-def _by_positions(rows: Rows, region: Region, most: int) -> Iterator[tuple[float, Array]]:
+def _by_positions(rows: Rows, region: Region) -> Iterator[tuple[float, Array]]:
     """Lambert's problem between places, near and far, both ways and with turns."""
     t, r = places(rows)
-    for i, j in _pairs(t, most):
+    for i, j in _pairs(t):
         for prograde in (True, False):
             for turns, late in _turns(t[j] - t[i], region):
                 try:
@@ -242,21 +243,21 @@ def _turns(dt: float, region: Region) -> list[tuple[int, bool]]:
     return [(0, False)] + [(k, late) for k in range(1, min(int(dt / lowest), 6) + 1) for late in (False, True)]
 
 
-def _pairs(t: Array, most: int) -> list[tuple[int, int]]:
+def _pairs(t: Array) -> list[tuple[int, int]]:
     """Pairs of indices, from neighbours to both ends."""
     if len(t) < 2:
         return []
     picks = np.unique(np.linspace(0, len(t) - 1, min(len(t), 5)).astype(int))
     pairs = [(0, len(t) - 1), *pairwise(picks.tolist()), *pairwise(range(0, len(t), max(1, len(t) // 4)))]
-    return [(i, j) for i, j in dict.fromkeys(pairs) if t[j] > t[i]][:most]
+    return [(i, j) for i, j in dict.fromkeys(pairs) if t[j] > t[i]][:SUBSETS]
 
 
-def _by_directions(rows: Rows, region: Region, most: int) -> Iterator[tuple[float, Array]]:
+def _by_directions(rows: Rows, region: Region) -> Iterator[tuple[float, Array]]:
     """Gauss's method and Gooding's on three directions, in the middle and far apart."""
     seen = rows.of(np.flatnonzero(rows.kind == DIRECTION))
     order = np.argsort(seen.t, kind="stable")
     times = seen.t[order]
-    for k, triple in enumerate(_triples(times, most)):
+    for k, triple in enumerate(_triples(times)):
         three = order[list(triple)]
         t, L, R = seen.t[three], seen.value[three], seen.observer[three]
         for method in (gauss, gooding) if k < SLOW else (gauss,):
@@ -267,7 +268,7 @@ def _by_directions(rows: Rows, region: Region, most: int) -> Iterator[tuple[floa
                 continue
 
 
-def _triples(t: Array, most: int) -> list[tuple[int, int, int]]:
+def _triples(t: Array) -> list[tuple[int, int, int]]:
     """Three times each: the whole span, its halves, and neighbourhoods."""
     found: list[tuple[int, int, int]] = []
     for a, b in ((0.0, 1.0), (0.0, 0.5), (0.5, 1.0), (0.25, 0.75), (0.0, 0.25), (0.75, 1.0)):
@@ -277,4 +278,4 @@ def _triples(t: Array, most: int) -> list[tuple[int, int, int]]:
         picks = [int(np.argmin(np.abs(t - at))) for at in (low, 0.5 * (low + high), high)]
         if t[picks[0]] < t[picks[1]] < t[picks[2]]:
             found.append((picks[0], picks[1], picks[2]))
-    return list(dict.fromkeys(found))[:most]
+    return list(dict.fromkeys(found))[:SUBSETS]

@@ -17,6 +17,7 @@ from piazzi.text import printable
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
 
+TOLD = 5  # failures, and bounds that are not known, of which more are counted
 _VIEW = {"realtime": "real time", "delayed": "delayed"}
 
 
@@ -117,20 +118,20 @@ def heading(stored: Stored) -> str:
     return printable(f"{specification['name'] or 'study'}: {runs}, seed {specification['seed']}")
 
 
-def failures(summary: Summary, most: int = 5) -> list[str]:
+def failures(summary: Summary) -> list[str]:
     """The first runs that failed and bounds that are not known, and why."""
     document = summary.to_dict()
-    found, unknown = document["messages"][:most], document["bounds_unknown"][:most]
+    found, unknown = document["messages"][:TOLD], document["bounds_unknown"][:TOLD]
     out = [printable(f"run {m['run']}, {m['estimator']} ({_VIEW[m['view']]}): {m['message']}") for m in found]
     total = sum(line.failed for line in summary.lines)
-    if total > most:
-        out.append(f"... and {total - most:,} more")
+    if total > TOLD:
+        out.append(f"... and {total - TOLD:,} more")
     stored = summary.stored
     for m in unknown:
         point = point_name(dict(zip(stored.about["axes"], stored.points[m["point"]], strict=True)))
         out.append(printable(f"Cramer-Rao bound{f' ({point})' if point else ''}: {m['message']}"))
-    if len(document["bounds_unknown"]) > most:
-        out.append(f"... and {len(document['bounds_unknown']) - most:,} more Cramer-Rao bounds")
+    if len(document["bounds_unknown"]) > TOLD:
+        out.append(f"... and {len(document['bounds_unknown']) - TOLD:,} more Cramer-Rao bounds")
     return out
 
 

@@ -80,12 +80,12 @@ def state_grid(name: str, estimate: Estimate, k: int = -1) -> Grid:
     return Grid(title, heads, tuple(rows))
 
 
-def state_table(name: str, estimate: Estimate, k: int = -1) -> Any:
+def state_table(name: str, estimate: Estimate) -> Any:
     """`state_grid` for terminals."""
     from rich.console import Group
     from rich.text import Text
 
-    grid = state_grid(name, estimate, k)
+    grid = state_grid(name, estimate)
     return Group(Text(printable(grid.title), style="bold"), _table(grid.heads, grid.rows))
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.determination.orbit import TILT
 from piazzi.determination.page.sampled import Sampled
 from piazzi.earth import body
 from piazzi.earth.constants import ASTRONOMICAL_UNIT
@@ -13,10 +14,6 @@ from piazzi.evaluate.quantities import Display, display_of
 from piazzi.present.report.blocks import Orbit, Section, Track
 from piazzi.problem.checks import Array
 
-OBLIQUITY = np.radians(84381.406 / 3600.0)  # of the ecliptic of J2000 to the axes, IAU 2006
-TO_ECLIPTIC = np.array(
-    [[1.0, 0.0, 0.0], [0.0, np.cos(OBLIQUITY), np.sin(OBLIQUITY)], [0.0, -np.sin(OBLIQUITY), np.cos(OBLIQUITY)]]
-)
 FARTHEST, NEAREST = 6.0, 0.18  # of ellipses that are drawn: over the size of what was seen; of the picture, for a name
 PLANETS = ("mercury", "venus", "earth", "mars", "jupiter", "saturn")
 _AU = Display("AU", 1.0 / ASTRONOMICAL_UNIT)
@@ -34,7 +31,7 @@ def ecliptic(found: Any, path: Sampled) -> Section:
 
 
 def _plane(found: Any, path: Sampled, epochs: Any) -> Orbit:
-    R = TO_ECLIPTIC
+    R = TILT
     place, own = path.mean[:, :3] @ R.T, ellipse(path.mean[len(path.mean) // 2], found.setup.measured.centre.mu) @ R.T
     tracks = [
         Track(place[:, 0], place[:, 1], found.object or "object", 0, *_ellipse(R[:2] @ path.covariance[:, :3, :3] @ R[:2].T))

@@ -140,31 +140,31 @@ def path_beside_truth(ax: Axes, path: Array, truth: Array, *, name: str = "estim
     return ax
 
 
-def position_at(ax: Axes, estimates: Mapping[tuple[str, str], Estimate], k: int = -1) -> Axes:
-    """Where each estimator puts the object at epoch `k`, from the truth (else the first of them), with 3-sigma ellipses.
+def position_at(ax: Axes, estimates: Mapping[tuple[str, str], Estimate]) -> Axes:
+    """Where each estimator puts the object at the last epoch, from the truth (else the first of them), with 3-sigma ellipses.
 
     Parameters
     ----------
     estimates : mapping of (name, view) to Estimate
     """
-    found = {key: e for key, e in estimates.items() if np.isfinite(e.mean[k]).all() and np.isfinite(e.covariance[k]).all()}
+    found = {key: e for key, e in estimates.items() if np.isfinite(e.mean[-1]).all() and np.isfinite(e.covariance[-1]).all()}
     first = next(iter(estimates.values()))
     i, j = _columns(first.problem)
     truth = known_truth(first)
-    known = truth is not None and bool(np.isfinite(truth[k, [i, j]]).all())
-    origin = truth[k, [i, j]] if truth is not None and known else next(iter(found.values()), first).mean[k, [i, j]]
-    sigma = [SIGMAS * np.sqrt(np.diagonal(e.covariance[k])[[i, j]].max()) for e in found.values()]
+    known = truth is not None and bool(np.isfinite(truth[-1, [i, j]]).all())
+    origin = truth[-1, [i, j]] if truth is not None and known else next(iter(found.values()), first).mean[-1, [i, j]]
+    sigma = [SIGMAS * np.sqrt(np.diagonal(e.covariance[-1])[[i, j]].max()) for e in found.values()]
     show = display_of(_unit_name(first.problem), sigma)
     names = tuple(name for name, _ in found)
     for n, ((name, view), e) in enumerate(found.items()):
         style = line_of(name, view, names)
         turns = (6 * n, (6, 6 * len(found) - 6)) if len(found) > 1 else "-"  # lines that coincide take turns
-        patch = _ellipse(e.mean[k, [i, j]] - origin, e.covariance[k][np.ix_([i, j], [i, j])], show)
+        patch = _ellipse(e.mean[-1, [i, j]] - origin, e.covariance[-1][np.ix_([i, j], [i, j])], show)
         patch.set(fill=False, edgecolor=style["color"], linestyle=turns, lw=2.0)
         ax.add_patch(patch)
         ax.plot(*patch.get_patch_transform().transform(UNIT_CIRCLE).T, color=style["color"], lw=0.6)
         mark = {"marker": MARKS[n % len(MARKS)], "mfc": "none", "mew": 1.4, "ms": 7, "color": style["color"]}
-        ax.plot(*((e.mean[k, [i, j]] - origin) * show.factor), **mark, ls="none")
+        ax.plot(*((e.mean[-1, [i, j]] - origin) * show.factor), **mark, ls="none")
         ax.plot([], [], **(style | mark), lw=1.6, label=label_of(name, view))
     if known:
         ax.plot(0, 0, "+", ms=12, mew=2, color=TRUTH, label="truth", zorder=4)
@@ -175,7 +175,7 @@ def position_at(ax: Axes, estimates: Mapping[tuple[str, str], Estimate], k: int 
     against = "truth" if known else "first estimate"
     ax.set_xlabel(show.label(plain(f"{names_of_states[i]} - {against}")))
     ax.set_ylabel(show.label(plain(f"{names_of_states[j]} - {against}")))
-    when = f"t = {first.times[k]:g} s" if first.epoch is None else (first.epoch + float(first.times[k])).rounded(0)
+    when = f"t = {first.times[-1]:g} s" if first.epoch is None else (first.epoch + float(first.times[-1])).rounded(0)
     ax.set_title(f"3-sigma ellipses at {when}")
     return ax
 

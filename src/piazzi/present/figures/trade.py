@@ -53,10 +53,10 @@ def window_cost(ax: Axes, trade: WindowTrade) -> Axes:
     return ax
 
 
-def timing(ax: Axes, epochs: Array, seconds: Array, *, name: str = "graph", label: str = "") -> Axes:
-    """Seconds of a whole estimation against the number of epochs, in the unit that suits the longest."""
+def timing(ax: Axes, epochs: Array, seconds: Array) -> Axes:
+    """Seconds of the whole graph against the number of epochs, in the unit that suits the longest."""
     factor, unit = (1.0, "s") if np.nanmax(seconds, initial=0.0) >= 1 else (1e3, "ms")
-    ax.plot(epochs, np.asarray(seconds) * factor, ".", ms=4, color=COLOURS.get(name, MEASURED), label=plain(label or name))
+    ax.plot(epochs, np.asarray(seconds) * factor, ".", ms=4, color=COLOURS["graph"], label="graph")
     ax.set_xlabel("length of the run [epochs]")
     ax.set_ylabel(f"time [{unit}]")
     ax.set_ylim(bottom=0)
