@@ -8,8 +8,9 @@ import piazzi as pz
 from piazzi.determination.centres import centre_of
 from piazzi.determination.initial import _why_not
 from piazzi.determination.initial_result import InitialOrbits, OrbitMode, UndeterminedError
-from piazzi.determination.ridge import OPEN, _ends, _speeds, openness, ridge
+from piazzi.determination.ridge import OPEN, _ends, _speeds, counted, openness, ridge
 from piazzi.orbit import propagate_kepler
+from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, RATE, Rows
 from piazzi.orbit.modes import two_body_modes
 from piazzi.orbit.starts import moment
 from tests.references.tracks import ABOUT_EARTH, ABOUT_SUN, EARTH, asteroid, low, near, orbit, packed, seen
@@ -27,6 +28,22 @@ def short(seed, times, sigma=1e-5):
         rows = seen(rng, x, station, times, {"direction": sigma})
         if len(rows) == len(times):
             return x, packed(rows), station(float(np.median(times)))[0]
+
+
+@pytest.mark.parametrize(
+    ("kinds", "known"),
+    [
+        ([(0.0, POSITION)], 3),  # one fix
+        ([(0.0, RANGE)] * 4, 3),  # four distances at once say where it is, and no more
+        ([(0.0, RANGE), (0.0, RATE), (1.0, RANGE)], 3),
+        ([(0.0, DIRECTION), (0.0, RANGE), (0.0, RATE)], 4),
+        ([(0.0, POSITION), (1.0, POSITION), (2.0, RANGE)], 6),
+    ],
+)
+def test_rows_that_are_too_few_for_any_orbit_are_counted(kinds, known):
+    t, kind = (np.array(column) for column in zip(*kinds, strict=True))
+    none = np.zeros((len(t), 3))
+    assert counted(Rows(t=t, kind=kind, observer=none, observer_velocity=none, value=none, sigma=none[:, :2])) == known
 
 
 def test_a_short_arc_is_a_ridge_and_a_pass_is_none():

@@ -12,7 +12,7 @@ from piazzi.determination.centres import Centre, centre_of
 from piazzi.determination.extending import LONGER, observer, part, refined, weighed
 from piazzi.determination.initial_result import InitialOrbits, OrbitMode, Parting, UndeterminedError
 from piazzi.determination.orbit_forces import STEPS
-from piazzi.determination.ridge import OPEN, openness, ridge
+from piazzi.determination.ridge import OPEN, counted, openness, ridge
 from piazzi.determination.sights import observers, rows_of
 from piazzi.orbit import propagate_kepler
 from piazzi.orbit.fits import Rows
@@ -56,7 +56,7 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None =
     if not search.modes and len(np.unique(rows.t)) > 2:
         raise ValueError(f"no orbit fits the {len(np.unique(index[first]))} rows of the first stretch ({search.starts} starts)")
     inside = [m for m in search.modes if m.admissible] or list(search.modes)
-    wide, known = openness(inside[0]) if inside else (np.inf, 0)
+    wide, known = openness(inside[0]) if inside else (np.inf, counted(rows.of(first)))
     ends = float(rows.t[first].min()), float(rows.t[first].max())
     found, keep, beyond = refined(problem, tracking, inside[:MOST], search.epoch, ends, centre)
     if wide > OPEN and ((tracking.row_times[keep] <= ends[1]) & (tracking.row_times[keep] >= ends[0])).all():

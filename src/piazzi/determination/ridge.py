@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.earth import Epoch
-from piazzi.orbit.fits import DIRECTION, RANGE, RATE, Rows, Setting, fitted
+from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, RATE, Rows, Setting, fitted
 from piazzi.orbit.modes import Mode
 from piazzi.orbit.starts import Moment, Region, moment
 from piazzi.problem.checks import Array
@@ -95,6 +95,13 @@ def openness(mode: Mode) -> tuple[float, int]:
     with np.errstate(divide="ignore"):
         sigma = 1.0 / values
     return float(sigma.max()), int((sigma < OPEN).sum())
+
+
+def counted(rows: Rows) -> int:
+    """How many of the six numbers of an orbit rows determine by their count: at one time a place and its rate at most."""
+    numbers = {RANGE: (1, 0), RATE: (0, 1), DIRECTION: (2, 0), POSITION: (3, 0)}
+    each = np.array([numbers[kind] for kind in rows.kind.tolist()])
+    return min(sum(int(np.minimum(each[rows.t == t].sum(axis=0), 3).sum()) for t in np.unique(rows.t)), 6)
 
 
 def ridge(rows: Rows, region: Region, begun: Epoch, known: int) -> Ridge:

@@ -140,9 +140,10 @@ def measured(
     everything, added = with_corrections(everything, sites)
     usable = everything.measured & everything.used
     left_out = dict(everything.left_out)
-    unused = int(np.count_nonzero(everything.measured & ~everything.used))
-    if unused:
-        left_out["rows that the file says are not to be used"] = unused
+    unused, speeds = everything.measured & ~everything.used, everything.of_kind("vx", "vy", "vz")
+    for rows, what in ((unused & speeds, "velocities that follow from positions"), (unused & ~speeds, "marked in the file")):
+        if rows.any():
+            left_out[f"rows not to be used: {what}"] = int(np.count_nonzero(rows))
     left_out |= {f"rows of {words}, which say nothing of the orbit": n for words, n in _silent(everything).items()}
     order = np.argsort(everything.t, kind="stable")
     index = order[usable[order]]
