@@ -20,6 +20,7 @@ from piazzi.arrays import Array
 SCALES = ("UTC", "TAI", "TT", "TDB", "TCG", "GPS", "UT1")
 DAY = 86400.0
 UTC_BEGINS = 36934.0  # 1960-01-01, the first day that UTC has
+STEADY = 41317.0  # 1972-01-01: since then UTC is whole seconds from TAI
 TT_TAI = 32.184
 _BEHIND_TT = {"TT": (0.0, 0.0), "TAI": (32.0, 0.184), "GPS": (51.0, 0.184)}  # whole seconds and the rest
 _TCG_EPOCH = 43144.0 + TT_TAI / DAY  # MJD of TT at which TT, TCG and TDB agreed: 1977-01-01T00:00:00 TAI
@@ -106,17 +107,23 @@ def _since_midnight(whole: Array, fraction: Array) -> tuple[Array, Array, Array]
 
 def _utc(day: Array, seconds: Array, fraction: Array) -> tuple[Array, Array, Array]:
     """A reading of TAI as one of UTC: the day is that of TAI or the one before, whose last minute may have 61 seconds."""
-    ahead = tai_utc(day, seconds)
-    for _ in range(2):
-        ahead = np.where(day < 41317.0, tai_utc(day, seconds + fraction - ahead), ahead)
+    ahead = _ahead(day, seconds, fraction)
     before = seconds + fraction < ahead
-    day = np.where(before, day - 1.0, day)
-    seconds = np.where(before, seconds + DAY, seconds)
-    ahead = np.where(before, tai_utc(day, seconds), ahead)
-    for _ in range(2):
-        ahead = np.where(day < 41317.0, tai_utc(day, seconds + fraction - ahead), ahead)
+    if before.any():
+        day = np.where(before, day - 1.0, day)
+        seconds = np.where(before, seconds + DAY, seconds)
+        ahead = np.where(before, _ahead(day, seconds, fraction), ahead)
     steps = np.floor(ahead)
     return day, *normalized(seconds - steps, fraction - (ahead - steps))
+
+
+def _ahead(day: Array, seconds: Array, fraction: Array) -> Array:
+    """TAI - UTC on a day of UTC at a reading of TAI."""
+    ahead = tai_utc(day, seconds)
+    drifts = day < STEADY
+    for _ in range(3 if drifts.any() else 0):
+        ahead = np.where(drifts, tai_utc(day, seconds + fraction - ahead), ahead)
+    return ahead
 
 
 def offset(scale: str, whole: Array, fraction: Array, orientation: Orientation | None = None) -> Array:

@@ -90,9 +90,10 @@ class Thermosphere(Tabulated):
         if not height.min() > LOWEST:
             t, low = t[np.argmin(height)], height.min() / 1e3
             raise ValueError(f"the arc of the thermosphere comes down to {low:.0f} km at t = {t:.0f} s: give a better orbit")
-        edges = self._log_density(epochs, latitude, longitude, height[:, None] + [[-_SPAN, _SPAN]])
+        given = self._given(epochs, latitude, longitude)
+        edges = _log_density(given, height[:, None] + [[-_SPAN, _SPAN]])
         reach = SCALE_HEIGHTS * 2.0 * _SPAN / (edges[:, 0] - edges[:, 1])
-        logs = self._log_density(epochs, latitude, longitude, height[:, None] + reach[:, None] * _NODES)
+        logs = _log_density(given, height[:, None] + reach[:, None] * _NODES)
         powers = np.linalg.lstsq(np.vander(_NODES, POWERS, increasing=True), logs.T, rcond=None)[0].T
         return np.column_stack([powers, height, reach])
 
@@ -102,25 +103,12 @@ class Thermosphere(Tabulated):
         arc_height, reach = self.value(t)[POWERS:]
         return float((height - arc_height) / reach * SCALE_HEIGHTS)
 
-    def _log_density(self, epochs: list[Epoch], latitude: Array, longitude: Array, heights: Array) -> Array:
-        """Logarithm of density (kg/m^3) at K places and several heights (m), (K, heights)."""
-        try:
-            import pymsis
-        except ModuleNotFoundError:
-            raise ValueError("drag 'msis' needs pymsis: pip install 'piazzi[msis]'") from None
+    def _given(self, epochs: list[Epoch], latitude: Array, longitude: Array) -> tuple[Array, ...]:
+        """What the model takes beside heights: date, longitude and latitude (deg), F10.7, its average and ap: K rows."""
         indices = [self._weather.at(epoch) for epoch in epochs]
-        dates = np.array(
-            [np.datetime64(epoch.to("UTC", digits=3).removesuffix(" UTC").replace(":60", ":59")) for epoch in epochs]
-        )
-        places = dates, np.degrees(longitude), np.degrees(latitude)
-        flux = [i.f107 for i in indices], [i.f107_average for i in indices], np.array([i.ap for i in indices])
-        count = heights.shape[1]
-        dates, longitudes, latitudes, f107, average, ap = (np.repeat(np.asarray(a), count, axis=0) for a in (*places, *flux))
-        km = np.maximum(heights.ravel() / 1e3, 50.0)
-        out = pymsis.calculate(
-            dates, longitudes, latitudes, km, f107, average, ap, version=VERSION, geomagnetic_activity=-1
-        )  # indices are always given: without them it would fetch a file
-        return np.asarray(np.log(np.asarray(out, dtype=float)[:, 0]).reshape(heights.shape))
+        dates = [np.datetime64(epoch.to("UTC", digits=3).removesuffix(" UTC").replace(":60", ":59")) for epoch in epochs]
+        flux = [i.f107 for i in indices], [i.f107_average for i in indices], [i.ap for i in indices]
+        return tuple(np.asarray(a) for a in (dates, np.degrees(longitude), np.degrees(latitude), *flux))
 
     def _arc(self, t: Array) -> Array:
         """Places of the nominal arc, (K, 3), by cubics through places and velocities a minute apart."""
@@ -138,6 +126,20 @@ class Thermosphere(Tabulated):
             rise = b[:, :3] - a[:, :3]
             out[rows] = a[:, :3] + u * (pull_a + u * (3 * rise - 2 * pull_a - pull_b + u * (pull_a + pull_b - 2 * rise)))
         return out
+
+
+def _log_density(given: tuple[Array, ...], heights: Array) -> Array:
+    """Logarithm of density (kg/m^3) at K places and several heights (m), (K, heights)."""
+    try:
+        import pymsis
+    except ModuleNotFoundError:
+        raise ValueError("drag 'msis' needs pymsis: pip install 'piazzi[msis]'") from None
+    dates, longitudes, latitudes, *indices = (np.repeat(a, heights.shape[1], axis=0) for a in given)
+    km = np.maximum(heights.ravel() / 1e3, 50.0)
+    out = pymsis.calculate(
+        dates, longitudes, latitudes, km, *indices, version=VERSION, geomagnetic_activity=-1
+    )  # indices are always given: without them it would fetch a file
+    return np.asarray(np.log(np.asarray(out, dtype=float)[:, 0]).reshape(heights.shape))
 
 
 def _geodetic(position: Array, epochs: list[Epoch]) -> tuple[Array, Array, Array]:
