@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 import piazzi as pz
 from piazzi.determination import determining
 from piazzi.determination.case import Case
+from piazzi.determination.case_file import split
 from piazzi.earth.eop import tables
 from piazzi.formats import Arc, Ephemeris, oem_text
 from tests.determination.fixing import EPOCH, truth
@@ -144,6 +146,15 @@ def test_what_cannot_be_written_or_read_is_refused_before_the_work(folder, call,
     before = (folder / "one.oem").read_bytes()
     assert says in call("determine", *arguments).refused()
     assert (folder / "one.oem").read_bytes() == before
+
+
+def test_a_case_of_ones_own_stands_over_that_of_the_package_whose_tracking_it_takes(tmp_path):
+    """As `--save` writes one of `piazzi determine ceres-1801`."""
+    (tmp_path / "own.toml").write_text('[determine]\nsigma = "7arcsec"\n')
+    _, plain = split(["ceres-1801"])
+    (tracking,), told = split([tmp_path / "own.toml", "ceres-1801"])
+    assert Path(tracking).name == "ceres-1801.txt"
+    assert told == plain.told({"sigma": "7arcsec"}) != plain
 
 
 @pytest.mark.slow

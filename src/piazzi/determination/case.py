@@ -95,7 +95,7 @@ class Case:
         "default", "FORCES", 'default, none, or "gravity=EGM2008 degree=40 drag=exponential".  [default: default]', usual=True
     )
     output: tuple[str, ...] = asked(
-        (), "FILE", "Write .oem, .opm, .ocm, .omm, .tle, .nc, .csv or .json; may be repeated.", read.texts, many=True,
+        (), "FILE", "Write .oem, .opm, .ocm, .omm, .tle, .nc, .csv, .json or .toml; may be repeated.", read.texts, many=True,
         usual=True, flags=("-o", "--output"),
     )  # fmt: skip
     report: str | None = asked(

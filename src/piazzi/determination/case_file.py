@@ -20,7 +20,7 @@ CASES = Path(__file__).parent / "cases"
 
 
 def split(given: Sequence[Any]) -> tuple[list[Any], Case]:
-    """What is tracking, and the case that is among the files; an empty one where there is none.
+    """What is tracking, and the case that is among the files, over that of the package whose tracking it is; else an empty one.
 
     Raises
     ------
@@ -31,11 +31,15 @@ def split(given: Sequence[Any]) -> tuple[list[Any], Case]:
     """
     given = [part for one in given for part in shipped(one)]
     cases = [one for one in given if isinstance(one, str | os.PathLike) and os.fspath(one).lower().endswith(ENDING)]
-    if not cases:
-        return list(given), Case()
-    if len(cases) > 1:
-        raise ValueError(f"{' and '.join(map(told_path, cases[:2]))} are both cases: give one")
-    return [one for one in given if one is not cases[0]], read_case(cases[0])
+    ours = [one for one in cases if Path(one).parent == CASES]
+    theirs = [one for one in cases if one not in ours]
+    for several in (ours, theirs):
+        if len(several) > 1:
+            raise ValueError(f"{' and '.join(map(told_path, several[:2]))} are both cases: give one")
+    told = Case()
+    for one in (*ours, *theirs):
+        told = read_case(one, told)
+    return [one for one in given if not any(one is case for case in cases)], told
 
 
 def shipped(given: Any) -> list[Any]:
@@ -67,8 +71,8 @@ def refuse_case(given: str, ending: str = ".toml") -> None:
         raise ValueError(f"{given} is tracking: piazzi determine {given} -o {given}{ending} makes {what} of it")
 
 
-def read_case(path: str | os.PathLike[str]) -> Case:
-    """The case in a file; files that it names are looked for beside it first.  Raises OSError, ValueError."""
+def read_case(path: str | os.PathLike[str], base: Case | None = None) -> Case:
+    """The case in a file, over another; files that it names are looked for beside it first.  Raises OSError, ValueError."""
     from piazzi.scenarios.loader import tables_of
     from piazzi.scenarios.table import ScenarioError
 
@@ -79,14 +83,15 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     if not any(section in tables for section in SECTIONS):
         raise ValueError(f"{name} is no case: it has no section [determine], [object] or [product] (stations: --stations)")
     try:
-        return _told(tables, Path(path).parent)
+        return _told(tables, Path(path).parent, base or Case())
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
 
 
-def _told(tables: Mapping[str, Any], folder: Path) -> Case:
-    """The case that the sections say; raises ValueError."""
-    case = Case(forces=_forces(tables["earth"], folder, "[earth]")) if "earth" in tables else Case()
+def _told(tables: Mapping[str, Any], folder: Path, case: Case) -> Case:
+    """The case with what the sections say; raises ValueError."""
+    if "earth" in tables:
+        case = replace(case, forces=_forces(tables["earth"], folder, "[earth]"))
     for section in SECTIONS:
         given = tables.get(section, {})
         if not isinstance(given, Mapping):
