@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import piazzi
+from piazzi.faces import homes
 
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {
@@ -42,7 +43,20 @@ def test_every_public_name_is_there():
         assert getattr(piazzi, name) is not None, name
     assert dir(piazzi) == sorted(piazzi.__all__)
     assert len(set(piazzi.__all__)) == len(piazzi.__all__)
-    assert set(piazzi._WHERE) == set(piazzi.__all__)
+
+
+@pytest.mark.parametrize("name", ["", ".earth", ".earth.sensors", ".evaluate", ".formats", ".orbit", ".scenarios"])
+def test_packages_say_where_each_of_their_names_is(name):
+    package = importlib.import_module(f"piazzi{name}")
+    told = homes(package.__file__).keys() | ({"scenarios"} if not name else set())  # which answers when it is called
+    assert told == set(package.__all__)
+    assert all(getattr(package, one) is not None for one in package.__all__)
+    assert dir(package) == sorted(package.__all__)
+
+
+def test_function_with_the_name_of_its_module_is_the_function_whoever_imports_the_module_first():
+    code = "import piazzi.orbit.lambert, piazzi.orbit\nassert callable(piazzi.orbit.lambert)\nfrom piazzi.earth import rotation"
+    loaded_after(f"{code}\nassert callable(rotation)")
 
 
 def test_unknown_name_is_an_attribute_error():

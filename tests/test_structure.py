@@ -17,6 +17,7 @@ MODULES = sorted(SOURCE.glob("piazzi/**/*.py"))
 
 # Upstream first; stages on one line may import each other.  `__init__` is the public face, made of what is above it.
 STAGES = """
+faces
 text units drawn arrays
 opening locks
 expressions

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from piazzi.faces import lazy
 
 if TYPE_CHECKING:
     from piazzi import earth, formats, orbit
@@ -87,63 +88,6 @@ if TYPE_CHECKING:
     from piazzi.simulation import simulate
     from piazzi.study import Study, read_store
 
-# Where a name is; nothing is imported before it is used
-_WHERE = {
-    name: module
-    for module, names in {
-        "piazzi.model": "Model Parameter Sensor",
-        "piazzi.kernels": "ConstantAcceleration Discrete DormandPrince DormandPrince5 Euler GaussJackson Heun Integrator "
-        "Kepler Midpoint Ralston RungeKutta RungeKutta4 RungeKutta8 Taylor",
-        "piazzi.earth": "Epoch",
-        "piazzi.formats": "Ephemeris Observations read_ephemeris read_tracking",
-        "piazzi.problem": "Gaussian Manoeuvre Pass Problem ProcessNoise Schedule Station Tracking Truth passes",
-        "piazzi.problem.gauss_markov": "with_gauss_markov",
-        "piazzi.orbit": "difference kepler_transition propagate_kepler",
-        "piazzi.simulation": "simulate",
-        "piazzi.estimate.bank": "Bank",
-        "piazzi.estimate.batch": "BatchLeastSquares",
-        "piazzi.estimate.estimator": "Estimate",
-        "piazzi.estimate.factor_graph": "FactorGraph",
-        "piazzi.estimate.forecast": "Forecast",
-        "piazzi.estimate.kalman": "ExtendedKalmanFilter Prediction Updated predict update",
-        "piazzi.estimate.live": "LiveFilter",
-        "piazzi.estimate.live_root": "LiveRootFilter",
-        "piazzi.estimate.live_window": "LiveWindow",
-        "piazzi.estimate.losses": "Cauchy Huber Tukey",
-        "piazzi.estimate.sliding_window": "SlidingWindow",
-        "piazzi.estimate.smoother": "Smoother",
-        "piazzi.estimate.square_root": "SquareRootKalmanFilter",
-        "piazzi.estimate.unscented": "UnscentedKalmanFilter",
-        "piazzi.estimate.long_steps": "step_warning",
-        "piazzi.estimate.prior": "with_prior_at",
-        "piazzi.estimate.propagation": "Propagation propagate",
-        "piazzi.estimate.substeps": "choose_substeps substep_error",
-        "piazzi.loading": "load",
-        "piazzi.io": "save",
-        "piazzi.outside.function": "Function",
-        "piazzi.outside.interpolation": "Interpolation",
-        "piazzi.outside.table": "Table",
-        "piazzi.evaluate.comparison": "Comparison compare",
-        "piazzi.evaluate.observable": "Observability",
-        "piazzi.evaluate.observing": "observability",
-        "piazzi.evaluate.window_lengths": "windows",
-        "piazzi.evaluate.window_trade": "WindowTrade",
-        "piazzi.study": "Study read_store",
-        "piazzi.present.progress": "progress",
-        "piazzi.present.report": "write_report",
-        "piazzi.determination.determining": "determine",
-        "piazzi.determination.ephemerides": "ephemeris",
-        "piazzi.determination.figures": "figures",
-        "piazzi.determination.following": "Following",
-        "piazzi.determination.initial": "initial_orbits",
-        "piazzi.determination.initial_result": "InitialOrbits",
-        "piazzi.determination.result": "Determination",
-        "piazzi.determination.unknowns": "Estimated",
-        "": "earth formats orbit scenarios",
-    }.items()
-    for name in names.split()
-}
-
 __version__ = "0.1.0"
 __all__ = [
     "Bank", "BatchLeastSquares", "Cauchy", "Comparison", "ConstantAcceleration", "Determination", "Discrete",
@@ -159,15 +103,4 @@ __all__ = [
     "update", "windows", "with_gauss_markov", "with_prior_at", "write_report",
 ]  # fmt: skip
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _WHERE:
-        raise AttributeError(f"module 'piazzi' has no attribute {name!r}")
-    home = _WHERE[name]
-    value = getattr(import_module(home), name) if home else import_module(f"piazzi.{name}")
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+lazy(__name__)

@@ -175,8 +175,6 @@ def _one(files: Sequence[str], case: Case) -> Determination:
 
 def _check_outputs(case: Case, files: Sequence[str]) -> None:
     """Refuse what could not be written, before anything is read."""
-    from piazzi.determination.products import ENDINGS
-
     for path in (*case.output, case.save):
         options.check_places({"files": files, "output_file": path})
 
@@ -185,6 +183,8 @@ def _check_outputs(case: Case, files: Sequence[str]) -> None:
             raise click.UsageError("-o -: products go into files; --json prints on stdout", click.get_current_context())
         if case.each and "{object}" not in path:
             raise click.UsageError(f"-o {path}: with --each the name has {{object}} in it", click.get_current_context())
+        from piazzi.determination.products import ENDINGS
+
         output.check_output(path, ENDINGS)
     doubled = [path for i, path in enumerate(case.output) if path in case.output[:i]]
     if doubled:

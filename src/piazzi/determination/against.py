@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.arcs import arc_of, dates_of
 from piazzi.formats import Ephemeris, read_ephemeris
 from piazzi.orbit import Difference, difference
@@ -35,11 +36,11 @@ def against(found: Any, other: Any, span: Any = None) -> Difference:
     arcs = orbit.of(chosen) if chosen else orbit.arcs
     length = end - begin
     if arcs:
-        t = np.unique(np.concatenate([arc.t + (arc.epoch - begin) for arc in arcs]))
+        t = distinct(np.concatenate([arc.t + (arc.epoch - begin) for arc in arcs]))
         t = t[(t >= 0.0) & (t <= length)]
     else:
         t = np.linspace(0.0, length, int(min(length // 60.0 + 2, MOST)))
     if len(t) < 2:
         raise ValueError("--against: the other orbit has no two rows within the span of the measurements")
-    t = t[np.unique(np.linspace(0, len(t) - 1, MOST).astype(int))]
+    t = t[distinct(np.linspace(0, len(t) - 1, MOST).astype(int))]
     return difference(arc_of(found, begin, t, "GCRF", formal=False), orbit, object=chosen)

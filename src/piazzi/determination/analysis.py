@@ -7,10 +7,9 @@ from math import ceil
 
 import numpy as np
 
-from piazzi.determination.earlier import root_of
+from piazzi.determination.orbit import root_of
 from piazzi.determination.setup import Setup, follow
 from piazzi.determination.sweep import swept
-from piazzi.estimate.batch import undisturbed
 from piazzi.evaluate.information import NEGLIGIBLE, along, factor, predicted, whitened
 from piazzi.problem import Problem
 from piazzi.problem.checks import Array
@@ -71,7 +70,11 @@ def of_orbit(root: Array) -> Array:
 
 def analysed(given: Setup, states: Array, derivatives: Array | None = None) -> Analysis:
     """Of states (K, n) at all epochs, as one orbit without process noise; `derivatives` (K, n, n) are by the first of them."""
-    problem = given.problem if given.problem.is_noise_free else undisturbed(given.problem)
+    problem = given.problem
+    if not problem.is_noise_free:
+        from piazzi.estimate.batch import undisturbed
+
+        problem = undisturbed(problem)
     inputs = prepare(problem, given.tracking)
     with np.errstate(all="ignore"):
         innovations, rows = _seen(problem, inputs, states, derivatives, given.chosen.max_step)

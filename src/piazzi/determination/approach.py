@@ -14,12 +14,13 @@ from math import ceil, pi
 
 import numpy as np
 
+from piazzi.arrays import median
 from piazzi.determination.analysis import Analysis, analysed
-from piazzi.determination.extending import part
 from piazzi.determination.setup import Setup, follow, scale_of, with_prior
 from piazzi.determination.sweep import swept
 from piazzi.evaluate.information import factor
 from piazzi.orbit import ModifiedEquinoctial
+from piazzi.problem import Tracking
 from piazzi.problem.checks import Array
 
 ENOUGH = 9  # values that a span begins with
@@ -75,6 +76,12 @@ def approached(given: Setup) -> Setup:
                 return with_prior(given, here.states, _wide(given, here))
             first = here.first
         half *= 2.0
+
+
+def part(tracking: Tracking, keep: Array) -> Tracking:
+    """The rows to keep (J,) alone."""
+    who = tracking.row_stations
+    return Tracking(tracking.row_times[keep], tracking.values[keep], None if who is None else who[keep], epoch=tracking.epoch)
 
 
 def refined(given: Setup) -> Setup:
@@ -202,7 +209,7 @@ def _change(first: Array, mu: float) -> Array:
 
 def _scale(whitened: Array) -> float:
     known = np.abs(whitened[np.isfinite(whitened)])
-    return SPREAD * max(1.0, 1.4826 * float(np.median(known))) if known.size else SPREAD
+    return SPREAD * max(1.0, 1.4826 * median(known)) if known.size else SPREAD
 
 
 def _cost(place: Place, scale: float, unit: Array, before: Array) -> float:

@@ -7,6 +7,7 @@ from math import ceil
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.density import departure
 from piazzi.determination.setup import Setup, follow
 from piazzi.earth import Epoch
@@ -31,11 +32,11 @@ def beliefs(given: Setup, estimate: Estimate, epochs: Sequence[Epoch]) -> tuple[
     nodes = estimate.times
     base = np.clip(np.searchsorted(nodes, t + ROUNDED, side="right") - 1, 0, len(nodes) - 1)
     one_orbit = given.problem.is_noise_free and estimate.view == "delayed" and len(t) > 1
-    later = np.flatnonzero(one_orbit & (t >= nodes[0]))
-    if len(later):
+    later = one_orbit & (t >= nodes[0])
+    if later.any():
         mean[later], P[later] = _along(given, estimate, base[later], t[later])
-    alone = np.setdiff1d(np.arange(len(t)), later)
-    for k in np.unique(base[alone]):
+    alone = np.flatnonzero(~later)
+    for k in distinct(base[alone]):
         own = alone[base[alone] == k]
         mean[own], P[own] = _from(given, estimate, int(k), t[own])
     return mean[:, :6], P[:, :6, :6] + departure(given, estimate, t)
@@ -48,7 +49,7 @@ def _along(given: Setup, estimate: Estimate, base: Array, t: Array) -> tuple[Arr
     """
     first = int(base.min())
     own = estimate.times[first : int(base.max()) + 1]
-    nodes = np.unique(np.concatenate([own, t]))
+    nodes = distinct(np.concatenate([own, t]))
     x, Phi = follow(given.problem, nodes, estimate.mean[first], within_kinks(given.problem.model, given.chosen.max_step))
     W, at, epoch = products(Phi), np.searchsorted(nodes, t), np.searchsorted(nodes, own)[base - first]
     off = np.linalg.solve(W[epoch], (estimate.mean[base] - x[epoch])[..., None])
@@ -73,7 +74,7 @@ def _from(given: Setup, estimate: Estimate, k: int, t: Array) -> tuple[Array, Ar
 def carried_to(problem: Problem, step: float, start: float, x: Array, P: Array, t: Array) -> tuple[Array, Array]:
     """States (K, n) and covariances at times that are all after `start`, or all before, by steps of at most `step`."""
     step = within_kinks(problem.model, step)
-    order = np.unique(t) if t[0] >= start else np.unique(t)[::-1]
+    order = distinct(t) if t[0] >= start else distinct(t)[::-1]
     nodes, marks = [start], []
     for when in order.tolist():
         if when != nodes[-1]:

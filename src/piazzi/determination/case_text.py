@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.case import OPTIONS, Case
 from piazzi.determination.fit import DEFAULT
 from piazzi.determination.setup import Setup
@@ -77,7 +78,7 @@ def _sigmas(rows: Observations) -> Iterable[str]:
     """Standard deviations by kind and station, where all rows of both have the same."""
     used = rows.measured & np.isfinite(rows.sigma)
     for k, kind in enumerate(rows.kinds):
-        for s in np.unique(rows.station[used & (rows.kind == k)]):
+        for s in distinct(rows.station[used & (rows.kind == k)]):
             values = np.unique(rows.sigma[used & (rows.kind == k) & (rows.station == s)])
             if len(values) == 1:
                 station = f".{rows.participants[s]}" if s >= 0 else ""

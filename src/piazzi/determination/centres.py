@@ -9,7 +9,7 @@ from math import pi
 import numpy as np
 
 from piazzi.earth.constants import ASTRONOMICAL_UNIT, GM
-from piazzi.orbit.starts import Region
+from piazzi.orbit.region import Region
 from piazzi.problem.checks import Array
 from piazzi.text import nearest
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from piazzi.arrays import distinct, median
 from piazzi.determination.analysis import Analysis, analysed
 from piazzi.determination.departures import LEAST
 from piazzi.determination.instruments import station_of
@@ -122,7 +123,7 @@ def _near_their_pass(given: Setup, analysis: Analysis) -> Array:
     """Rows (J,) that are not far from the others of their pass, of passes long enough to tell."""
     passes = pass_of_rows(given.measured, given.tracking, given.rows)
     near = np.zeros(len(passes), dtype=np.bool_)
-    for one in np.unique(passes[passes > 0]):
+    for one in distinct(passes[passes > 0]):
         own = np.flatnonzero(passes == one)
         known = analysis.whitened[own]
         known = known[:, np.isfinite(known).sum(axis=0) >= FEWEST]
@@ -138,10 +139,10 @@ def together(given: Setup, analysis: Analysis, rows: Array) -> tuple[float, int]
     """
     passes = pass_of_rows(given.measured, given.tracking, given.rows)
     squares = []
-    for one in np.unique(passes[rows & (passes > 0)]):
+    for one in distinct(passes[rows & (passes > 0)]):
         own = analysis.whitened[rows & (passes == one)]
         for column in own.T:
             known = column[np.isfinite(column)]
             if len(known) >= FEWEST:
-                squares.append(float(np.median(known)) ** 2 * len(known) / MEDIAN)
+                squares.append(median(known) ** 2 * len(known) / MEDIAN)
     return (float(np.sum(squares)), len(squares)) if squares else None

@@ -22,7 +22,8 @@ from piazzi.earth.force_options import TIDES
 from piazzi.earth.force_text import Force
 from piazzi.evaluate.information import singular, whitened
 from piazzi.expressions import evaluate_arrays
-from piazzi.model.definitions import needed
+from piazzi.model.definitions import Hoist, definitions_of, in_order
+from piazzi.model.pruning import used_definitions
 from piazzi.model.values import with_arrays
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import prepare
@@ -91,7 +92,7 @@ def _gravity(given: Setup, states: Array) -> Iterator[tuple[str, Array]]:
     more = min(max(2 * degree, LEAST), LARGEST, int(field.field.degree)) if isinstance(field, Gravity) else 0
     if more <= degree:
         return
-    larger = replace(given.problem, functions={**given.problem.functions, "field": replace(field, degree=more)})
+    larger = given.problem.with_data({"field": replace(field, degree=more)})
     inputs, times, step = prepare(given.problem, given.tracking), given.tracking.times, given.chosen.max_step
     with np.errstate(all="ignore"):  # whitened; by the same sensors: the field is the orbit's
         here, there = (
@@ -140,9 +141,12 @@ def _pulls(given: Setup, t: Array, path: Array) -> Iterator[tuple[str, Array]]:
         return
     numbers = {**every.values, "cr_a_m": REFLECTED, "cd_a_m": DRAGGED, "t": t}
     numbers |= dict(zip(("x", "y", "z", "vx", "vy", "vz"), path.T[:6], strict=True))
-    model, functions = every.model(), every.functions(given.measured.epoch, choice.eop, choice.kernel)
-    wanted = needed([text for part in missing for text in part.acceleration], model.definitions)
-    values = with_arrays(numbers, wanted | {"bx", "by", "bz"}, model.definitions, functions=functions)
+    functions = every.functions(given.measured.epoch, choice.eop, choice.kernel)
+    text = used_definitions(every.definitions, [text for part in missing for text in part.acceleration])
+    calls = Hoist(functions)
+    definitions = definitions_of(text, "forces", calls)
+    wanted = in_order((*definitions, *calls.found), "forces")
+    values = with_arrays(numbers, {name for d in wanted for name in d.provides}, wanted, functions=functions)
     sums: dict[str, Array] = {}
     for part in missing:
         name = WORDS.get(part.switch, f"the pull of {part.switch.removesuffix('_on').title()}")

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.sites import matched
 from piazzi.earth import StationList
 from piazzi.earth.constants import SPEED_OF_LIGHT
@@ -55,7 +56,7 @@ def _by_clocks(observations: Observations) -> tuple[Observations, tuple[str, ...
     A bias goes on from its time with the last drift that was given, as far as the next one, or linearly where there is none.
     """
     t, said = observations.t.copy(), []
-    for station in np.unique(observations.station[observations.of_kind("clock_bias")]).tolist():
+    for station in distinct(observations.station[observations.of_kind("clock_bias")]).tolist():
         own = observations.station == station
         times, biases = series(observations, own, "clock_bias")
         changes, drifts = series(observations, own, "clock_drift")

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.beliefs import beliefs, carried_to
 from piazzi.determination.centres import EARTH, Centre, centre_of
 from piazzi.determination.density import Law, departed
@@ -309,7 +310,7 @@ def _of_rows(name: str, arcs: Sequence[Any], source: str, start: Any, forces: An
         whole = arc.t[np.isfinite(arc.position).all(axis=1)] + (arc.epoch - start.epoch)
         first, last = (None if end is None else end - start.epoch for end in arc.useable)
         spans.append((max(whole.min(), first or -np.inf), min(whole.max(), np.inf if last is None else last)))
-    nodes = np.unique(np.concatenate([arc.covariance_t + (arc.epoch - start.epoch) for arc in arcs]))
+    nodes = distinct(np.concatenate([arc.covariance_t + (arc.epoch - start.epoch) for arc in arcs]))
 
     def between(t: Array) -> tuple[Array, Array | None]:
         r, v = path.states(t)

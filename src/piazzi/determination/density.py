@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.analysis import analysed
 from piazzi.determination.motion import Extra, instead
 from piazzi.determination.orbit_forces import AirVaries, Chosen
@@ -189,7 +190,7 @@ def departed(problem: Problem, step: float, start: float, x: Array, drag: tuple[
     place, size = drag
     away = np.abs(t - start)
     every = law.time / PARTS if t[0] > start else min(step, law.time / PARTS)
-    nodes = np.unique(np.concatenate([[0.0], np.arange(0.0, away.max(), every), away]))
+    nodes = distinct(np.concatenate([[0.0], np.arange(0.0, away.max(), every), away]))
     _, Phi = follow(problem, start + nodes if t[0] > start else start - nodes, x, step)
     rates, own = np.array(ORDERS) / law.time, slice(6, None)
     S, A = np.zeros((2, 6 + len(rates), 6 + len(rates)))

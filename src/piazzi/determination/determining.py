@@ -7,7 +7,7 @@ import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,24 +19,17 @@ from piazzi.determination.case import Case
 from piazzi.determination.case_file import split
 from piazzi.determination.common import BIASES, pass_biases, with_wider_biases
 from piazzi.determination.density import with_density
-from piazzi.determination.earlier import Earlier, earlier_of, fresh
 from piazzi.determination.editing import edited
 from piazzi.determination.faults import BEYOND, CORRELATED, Faults, named
 from piazzi.determination.fit import begun, estimate, estimators
 from piazzi.determination.guesses import Guess, from_fixes, guess_of
 from piazzi.determination.holding import NONE, Held, held, unasked
-from piazzi.determination.initial import initial_orbits
-from piazzi.determination.initial_result import InitialOrbits
 from piazzi.determination.instruments import with_instruments
 from piazzi.determination.orbit_forces import Chosen, check_forces, chosen_forces, orientation_of
 from piazzi.determination.partners import Partner, check_partners, partners_of, with_partners
-from piazzi.determination.products import check_writable
-from piazzi.determination.pseudoranges import positions
 from piazzi.determination.result import Determination
 from piazzi.determination.sensing import Measured, measured, of_object, oriented
 from piazzi.determination.setup import Setup, at_last_used, posed, setup
-from piazzi.determination.sun_forces import forces_about_the_sun
-from piazzi.determination.unguided import first_look, goes_about_the_sun, nominal, unguided
 from piazzi.determination.unknowns import BIAS, CLOCK, SCALE, asked
 from piazzi.determination.verdict import verdict
 from piazzi.determination.whiteness import with_white_fixes
@@ -48,6 +41,10 @@ from piazzi.estimate.estimator import Estimate, Estimator
 from piazzi.formats import Conventions, Observations, concatenate, read_tracking
 from piazzi.formats.conventions import with_conventions
 from piazzi.problem.checks import Array
+
+if TYPE_CHECKING:
+    from piazzi.determination.earlier import Earlier
+    from piazzi.determination.initial_result import InitialOrbits
 
 SOURCES = (str, os.PathLike)
 INSTRUMENTS = (BIAS, SCALE, CLOCK)
@@ -138,7 +135,10 @@ def determined(
         frame_named(case.frame)
     say("reading")
     given = prepared(*tracking, case=case)
-    check_writable(given.problem, case.output)
+    if case.output:
+        from piazzi.determination.products import check_writable
+
+        check_writable(given.problem, case.output)
     axes = answer_axes(given, case.frame)
     say("approaching")
     centre = given.measured.centre
@@ -151,7 +151,10 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
     case = told.told(words) if case is None else case
     _, at = _instant(case.epoch)
     seen, chosen, begin, earlier = read(files, case)
-    begin = begin or unguided(seen, lambda first: posed(seen, chosen(first, still=True), first))
+    if begin is None:
+        from piazzi.determination.unguided import unguided
+
+        begin = unguided(seen, lambda first: posed(seen, chosen(first, still=True), first))
     return setup(seen, chosen(begin), begin, at=at, earlier=earlier)
 
 
@@ -164,6 +167,9 @@ def ready(given: Setup) -> Setup:
 
 def fitting_orbits(*tracking: Any, case: Case | None = None, **words: Any) -> InitialOrbits:
     """All orbits that fit a tracking, of the same words as `determine`, whose guess is not asked for."""
+    from piazzi.determination.initial import initial_orbits
+    from piazzi.determination.unguided import first_look
+
     files, told = split(tracking)
     case = told.told(words) if case is None else case
     seen, chosen, _, _ = read(files, replace(case, guess=None, prior=None))
@@ -194,12 +200,16 @@ def read(
 
     def chosen(orbit: Guess, still: bool = False) -> Chosen:
         if seen.about == "sun":
+            from piazzi.determination.sun_forces import forces_about_the_sun
+
             found = forces_about_the_sun(case.forces, orbit.state)
         else:
             found = chosen_forces(case.forces, orbit.state, name=seen.object, mass=case.mass, area=case.area)
         return with_unknowns(found, [one for one in wanted if not (still and one.what.is_process)], burns, seen)
 
     if begin is None and wanted:
+        from piazzi.determination.unguided import nominal
+
         chosen(nominal(seen, LOW))  # what no orbit has is refused before one is looked for
     return seen, chosen, begin, earlier
 
@@ -215,6 +225,8 @@ def _beside_prior(rows: Observations, case: Case) -> tuple[Observations, Earlier
     if not len(there):
         raise ValueError("there is no measurement to use")
     first = rows.epoch + float(there.min())
+    from piazzi.determination.earlier import earlier_of, fresh
+
     earlier = earlier_of(case.prior, first if since is None else max(first, since), case.object)
     return fresh(rows, earlier, since), earlier
 
@@ -241,8 +253,10 @@ def _seen(
     seen = by(case.about or "earth")
     begin = earlier.guess if earlier and case.guess is None else _guess(case.guess, seen, case.object)
     about = begin.about if begin is not None else seen.about
-    if case.about is None and begin is None and goes_about_the_sun(seen):
-        about = "sun"
+    if case.about is None and begin is None:
+        from piazzi.determination.unguided import goes_about_the_sun
+
+        about = "sun" if goes_about_the_sun(seen) else about
     if case.about not in (None, about):
         raise ValueError(f"--about {case.about}: the guess is about the {about.title()}")
     return (seen if about == seen.about else by(about)), begin
@@ -389,6 +403,8 @@ def _guess(given: Any, seen: Measured, chosen: str | None) -> Guess | None:
     wide = {s.name for s in seen.stations if s.sensor.startswith("position")}
     own = np.isin(seen.tracking.row_stations, list(wide)) & np.isfinite(seen.tracking.values[:, :3]).all(axis=1) if wide else []
     if not np.any(own):
+        from piazzi.determination.pseudoranges import positions
+
         found = from_fixes(seen.epoch, *positions(seen.stations, seen.tracking))
         return None if found is None else replace(found, source="the pseudoranges")
     return from_fixes(seen.epoch, seen.tracking.row_times[own], seen.tracking.values[own, :3])

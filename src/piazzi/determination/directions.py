@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.parts import Part
 from piazzi.determination.ranging import EVENTS, passes
 from piazzi.determination.sites import Context, weather_of
@@ -47,9 +48,7 @@ def ascensions(context: Context, index: Array) -> Sequence[Part]:
     """Rows of right ascension and declination, likewise; of an observer that moves those of each place."""
     place = context.observations.place
     return [
-        _part(context, rows[place[rows] == k], RADEC)
-        for rows in passes(context, index)
-        for k in np.unique(place[rows]).tolist()
+        _part(context, rows[place[rows] == k], RADEC) for rows in passes(context, index) for k in distinct(place[rows]).tolist()
     ]
 
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.guesses import SCHEMA, Guess
-from piazzi.determination.orbit import definite_root
 from piazzi.determination.physical import DENSITY, is_node
 from piazzi.determination.words import date
 from piazzi.earth import Epoch
@@ -219,8 +218,3 @@ def fresh(rows: Observations, earlier: Earlier, since: Epoch | None) -> Observat
     if not count:
         return rows
     return replace(rows[~old], left_out=(*rows.left_out, (f"measurements that {earlier.source} has used already", count)))
-
-
-def root_of(covariance: Array) -> Array:
-    """Lower triangular root of a covariance, in which what is singular is rounding."""
-    return definite_root(0.5 * (covariance + covariance.T))

@@ -13,6 +13,7 @@ from math import exp
 
 import numpy as np
 
+from piazzi.arrays import median
 from piazzi.determination.analysis import Analysis
 from piazzi.determination.faults import CORRELATED, DUPLICATE, OUTLIER, STATION
 from piazzi.determination.passes import labels_of, passes
@@ -74,9 +75,9 @@ def _settled(given: Setup, analysis: Analysis, keep: Array, repeated: Array, the
     for _ in range(ROUNDS):
         squared = _squared(analysis, keep, unit, there)
         own = squared[keep & (degrees > 0)] / degrees[keep & (degrees > 0)]
-        middle = float(np.median(own)) / 0.4549 if own.size else 1.0  # of a chi-square with one degree of freedom
+        middle = median(own) / 0.4549 if own.size else 1.0  # of a chi-square with one degree of freedom
         wide = min(wide, max(1.0, middle))
-        usual = min(1.0, float(np.median((squared / _beyond(0.5, degrees))[keep & (degrees > 0)]))) if own.size else 1.0
+        usual = min(1.0, median((squared / _beyond(0.5, degrees))[keep & (degrees > 0)])) if own.size else 1.0
         gate = _gate(squared[~repeated] / wide, degrees[~repeated], usual)
         out, back = (_beyond(p, degrees) * wide for p in (gate, BACK * gate))
         new = np.where(keep, squared <= out, squared < back) & ~repeated

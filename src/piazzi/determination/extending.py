@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from piazzi.determination.approach import part
 from piazzi.determination.beliefs import carried_to
 from piazzi.determination.centres import Centre
 from piazzi.determination.initial_result import Beyond, OrbitMode
@@ -78,12 +79,6 @@ def refined(
             break
         found, keep = again, wider
     return found, keep, beyond
-
-
-def part(tracking: Tracking, keep: Array) -> Tracking:
-    """The rows to keep (J,) alone."""
-    who = tracking.row_stations
-    return Tracking(tracking.row_times[keep], tracking.values[keep], None if who is None else who[keep], epoch=tracking.epoch)
 
 
 def observer(problem: Problem, tracking: Tracking, keep: Array) -> Array:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.holding import on_sky
 from piazzi.determination.passes import labels_of, passes
 from piazzi.determination.setup import Setup, follow
@@ -124,7 +125,7 @@ def _whitened(given: Setup, states: Array, rows: Array, late: float, station: st
     which = moved.stations_of(problem)
     z = tracking.values[rows]
     off = wrapped(problem, which, z - computed)
-    for s in np.unique(which):
+    for s in distinct(which):
         own = which == s
         m = len(problem.stations[s].noise)
         off[own, :m] *= on_sky(problem, int(s), computed[own][:, :m])
@@ -153,7 +154,7 @@ def _below(given: Setup, states: Array, rows: Array) -> Array:
     tracking, out = given.tracking, np.zeros(len(rows), dtype=bool)
     which = tracking.stations_of(given.problem)[rows]
     k = np.searchsorted(tracking.times, tracking.row_times[rows])
-    for s in np.unique(which):
+    for s in distinct(which):
         site: Any = getattr(given.problem.stations[s].place, "station", None)
         if site is None or given.measured.about != "earth":
             continue

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.parts import Part
 from piazzi.determination.sites import Context
 from piazzi.earth import rotation, sensors, transform
@@ -67,7 +68,7 @@ def _part(context: Context, rows: Array, sensor: Sensor) -> Part:
     noise[:, place, place] = sigma**2
     segments = observations.segment[rows[:, 0]]
     assumed: list[str] = []
-    for i in np.unique(segments):
+    for i in distinct(segments):
         own = segments == i
         frame = _frame(observations, int(i))
         if frame in ("GCRF", "ICRF"):

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import distinct, median
 from piazzi.determination.parts import Part
 from piazzi.determination.ranging import part_of, passes, way_of
 from piazzi.determination.rates import count_of
@@ -50,7 +51,7 @@ def frequencies(context: Context, index: Array) -> Sequence[Part]:
         else:
             found.append(_part(context, rows, carrier, estimated=False))
     if unknown:
-        nominal = _rounded(context, float(np.median(context.observations.value[np.concatenate(unknown)])))
+        nominal = _rounded(context, median(context.observations.value[np.concatenate(unknown)]))
         context.said[f"the carrier is estimated, before the measurements {nominal / 1e6:g} MHz"] = None
         found += [_part(context, rows, nominal, estimated=True) for rows in unknown]
     return found
@@ -123,7 +124,7 @@ def _returned(context: Context, segment: Segment, rows: Array) -> Iterator[Part]
     rows, piece = _on_one_piece(context, rows, ramp, count, numbers.get("count", 0.0))
     sensor = _returning(way.path, count, context.clocks, way.transmitter)
     late = context.observations.epoch - context.epoch
-    for k in np.unique(piece):
+    for k in distinct(piece):
         since = 0.0 if np.isinf(ramp.t[k]) else float(ramp.t[k]) + late
         sent: dict[str, Any] = {
             "transmit_frequency": float(ramp.frequency[k]),

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.analysis import Analysis, analysed, of_orbit
 from piazzi.determination.fit import estimate
 from piazzi.determination.passes import labels_of, passes
@@ -223,7 +224,7 @@ def _by_estimator(given: Setup, estimator: Estimator, answer: Estimate, rest: Ar
     which, k = tracking.stations_of(problem)[rows], np.searchsorted(tracking.times, tracking.row_times[rows])
     off, inside, squares = np.full((len(rows), tracking.values.shape[1]), np.nan), None, 0.0
     inside = off.copy()
-    for s in np.unique(which):
+    for s in distinct(which):
         own = np.flatnonzero(which == s)
         x, P, t = found.mean[k[own]], found.covariance[k[own]], tracking.row_times[rows[own]]
         name, m = problem.stations[s].name, len(problem.stations[s].noise)

@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from piazzi.arrays import distinct
+from piazzi.determination.approach import part
 from piazzi.determination.beliefs import carried_to
 from piazzi.determination.centres import Centre, centre_of
-from piazzi.determination.extending import LONGER, observer, part, refined, weighed
+from piazzi.determination.extending import LONGER, observer, refined, weighed
 from piazzi.determination.initial_result import InitialOrbits, OrbitMode, Parting, UndeterminedError
 from piazzi.determination.orbit_forces import STEPS
 from piazzi.determination.ridge import OPEN, counted, openness, ridge
@@ -17,7 +19,7 @@ from piazzi.determination.sights import observers, rows_of
 from piazzi.orbit import propagate_kepler
 from piazzi.orbit.fits import Rows
 from piazzi.orbit.modes import Mode, Search, two_body_modes
-from piazzi.orbit.starts import Region
+from piazzi.orbit.region import Region
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 
@@ -53,8 +55,8 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None =
     region = centre.region if region is None else region
     rows, index = rows_of(problem, _around(tracking, centre.stretch))
     first, search = _looked(rows, centre.stretch, region)
-    if not search.modes and len(np.unique(rows.t)) > 2:
-        raise ValueError(f"no orbit fits the {len(np.unique(index[first]))} rows of the first stretch ({search.starts} starts)")
+    if not search.modes and len(distinct(rows.t)) > 2:
+        raise ValueError(f"no orbit fits the {len(distinct(index[first]))} rows of the first stretch ({search.starts} starts)")
     inside = [m for m in search.modes if m.admissible] or list(search.modes)
     wide, known = openness(inside[0]) if inside else (np.inf, counted(rows.of(first)))
     ends = float(rows.t[first].min()), float(rows.t[first].max())
@@ -63,7 +65,7 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None =
         what = ridge(rows.of(first), region, problem.epoch, known)
         return InitialOrbits((), search.starts, search.fits, None, centre.name, what, beyond)
     modes = weighed(found, observer(problem, tracking, keep))
-    modes = modes or tuple(_unrefined(problem, search, inside[:MOST], len(np.unique(index[first]))))
+    modes = modes or tuple(_unrefined(problem, search, inside[:MOST], len(distinct(index[first]))))
     modes = tuple(replace(mode, why_not=_why_not(mode.mean, region, centre)) for mode in modes)
     apart = _apart(problem, tracking, modes, centre) if len(modes) > 1 else None
     return InitialOrbits(modes, search.starts, search.fits, apart, centre.name, None, beyond)

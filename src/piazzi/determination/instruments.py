@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import median
 from piazzi.determination.passes import pass_of_rows
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import BIAS, CLOCK, PASS, Asked, Label
@@ -170,7 +171,7 @@ def _usual(seen: Measured, number: str, kind: str, members: Sequence[int]) -> fl
         width = len(components)
         diagonal = np.diag(noise.reshape(width, width)) if noise.size == width**2 else np.broadcast_to(noise, width)
         sizes.append(float(diagonal[components.index(kind)]) ** 0.5)
-    return TIMES * float(np.median(sizes))
+    return TIMES * median(np.array(sizes))
 
 
 def _extended(sensor: Any, constants: Sequence[Constant]) -> Instrument:

@@ -138,3 +138,8 @@ def definite_root(P: Array) -> Array:
     values, vectors = np.linalg.eigh(0.5 * (C + C.T))
     root = vectors * np.sqrt(np.maximum(values, FLOOR * max(float(values[-1]), 1e-300)))
     return transform_root(scale[:, None] * root, np.eye(len(P)))
+
+
+def root_of(covariance: Array) -> Array:
+    """Lower triangular root of a covariance, in which what is singular is rounding."""
+    return definite_root(0.5 * (covariance + covariance.T))

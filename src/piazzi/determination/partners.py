@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.determination.course import HDF5, JSON, course_of
+from piazzi.arrays import distinct
 from piazzi.determination.sites import ABOARD, aboard, matched, sites_of
 from piazzi.earth import Epoch
 from piazzi.earth.constants import SPEED_OF_LIGHT
 from piazzi.formats import Ephemeris, Observations, read_ephemeris
 from piazzi.opening import opened as opened_file
-from piazzi.orbit.paths import opened, path_of
 from piazzi.outside.table import Table
 from piazzi.problem.checks import Array
 from piazzi.text import brief, listed
@@ -41,6 +40,8 @@ class Partner:
     @property
     def arcs(self) -> tuple[Any, ...]:
         """Arcs of its ephemeris, none where it is known otherwise."""
+        from piazzi.orbit.paths import opened
+
         found = opened(self.source, self.chosen)[1] if isinstance(self.source, Ephemeris) else ()
         return found if isinstance(found, tuple) else ()
 
@@ -52,6 +53,9 @@ class Partner:
         return self._paths[key]  # type: ignore[no-any-return]
 
     def _path(self, epoch: Epoch) -> tuple[Any, Any]:
+        from piazzi.determination.course import course_of
+        from piazzi.orbit.paths import opened, path_of
+
         if isinstance(self.source, Ephemeris):
             path = path_of(self.name, opened(self.source, self.chosen)[1], epoch, None)
             return path.covered, lambda t: np.hstack(path.states(t))
@@ -128,6 +132,9 @@ def _split(text: Any) -> tuple[str, Any]:
 
 
 def _read(name: str, orbit: Any) -> dict[str, Partner]:
+    from piazzi.determination.course import HDF5, JSON, course_of
+    from piazzi.orbit.paths import opened
+
     if isinstance(orbit, str | os.PathLike):
         with opened_file(orbit) as file:
             start = file.read(512)
@@ -156,7 +163,7 @@ def check_partners(rows: Observations, partners: Mapping[str, Partner], stations
     lasers = any(segment.wavelength is not None for segment in rows.segments)
     sites = sites_of("ilrs" if lasers and stations is None else stations)
     for name, there in own.items():
-        observers = {rows.participants[k] for k in np.unique(rows.station[there]) if k >= 0} - partners.keys()
+        observers = {rows.participants[k] for k in distinct(rows.station[there]) if k >= 0} - partners.keys()
         ground = sorted(one for one in observers if sites is not None and matched(one, sites))
         if ground:
             raise ValueError(f"--participant {name}: that is what {listed(ground)} measured, the object itself: leave it out")

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.parts import Part
 from piazzi.determination.sites import Context, aboard, weather_of
 from piazzi.earth import Station, laser_sphere, sensors
@@ -55,7 +56,7 @@ def ranges(context: Context, index: Array) -> Sequence[Part]:
 
 def by_kind(context: Context, index: Array) -> Iterator[tuple[str, Array]]:
     """The rows of each kind that there is."""
-    for i in np.unique(context.observations.kind[index]).tolist():
+    for i in distinct(context.observations.kind[index]).tolist():
         yield context.observations.kinds[i], index[context.observations.kind[index] == i]
 
 
@@ -63,7 +64,7 @@ def passes(context: Context, index: Array) -> Iterator[Array]:
     """Rows of one station, segment, tag and receiver without a long gap, each (R,)."""
     rows = context.observations
     keys = np.stack([rows.station[index], rows.segment[index], rows.tag[index], aboard(rows)[index]], axis=1)
-    for key in np.unique(keys, axis=0):
+    for key in sorted(set(map(tuple, keys.tolist()))):
         own = index[(keys == key).all(axis=1)]
         own = own[np.argsort(rows.t[own], kind="stable")]
         yield from np.split(own, np.flatnonzero(np.diff(rows.t[own]) > GAP) + 1)

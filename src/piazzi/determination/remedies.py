@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import distinct, median
 from piazzi.determination.analysis import Analysis
 from piazzi.determination.completeness import carrying
 from piazzi.determination.passes import pass_of_rows
@@ -142,10 +143,10 @@ def _biases(given: Setup, analysis: Analysis, there: Array) -> Iterator[tuple[st
         if not any(f"{kind}_bias" in dict(getattr(s, "defaults", ())) for s in sensors.values()):
             continue
         own = kinds == kind
-        every = np.unique(passes[own])
+        every = distinct(passes[own])
         if len(every) > MOST:
             continue
-        size = float(np.median(np.abs(analysis.residual[there][own] / analysis.whitened[there][own])))
+        size = median(np.abs(analysis.residual[there][own] / analysis.whitened[there][own]))
         unit = next(dict(s.units).get(kind, "") for s in sensors.values() if kind in s.components)
         yield f"--estimate bias.{kind}/pass={{0}}{unit}", size, (passes[:, None] == every) * own[:, None].astype(float)
 

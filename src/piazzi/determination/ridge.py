@@ -16,7 +16,8 @@ import numpy as np
 from piazzi.earth import Epoch
 from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, RATE, Rows, Setting, fitted
 from piazzi.orbit.modes import Mode
-from piazzi.orbit.starts import Moment, Region, moment
+from piazzi.orbit.region import Region
+from piazzi.orbit.starts import Moment, moment
 from piazzi.problem.checks import Array
 
 OPEN = 0.3  # of distance or speed, from which on a sigma is no point's

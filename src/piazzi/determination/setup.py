@@ -6,13 +6,14 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piazzi.determination.earlier import Earlier, root_of
+from piazzi.arrays import distinct
 from piazzi.determination.guesses import Guess
 from piazzi.determination.motion import Extra, process_noise, with_processes
+from piazzi.determination.orbit import root_of
 from piazzi.determination.orbit_forces import Chosen
 from piazzi.determination.physical import (
     AIR,
@@ -28,7 +29,6 @@ from piazzi.determination.physical import (
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import Label
 from piazzi.earth import EphemerisWarning, Epoch
-from piazzi.estimate.propagation import propagate
 from piazzi.kernels import RungeKutta8
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.arcs import Steps, arc
@@ -36,6 +36,9 @@ from piazzi.problem.checks import Array
 from piazzi.problem.dense import dense_grid, on_dense_grid
 from piazzi.problem.manoeuvres import SAME
 from piazzi.text import brief
+
+if TYPE_CHECKING:
+    from piazzi.determination.earlier import Earlier
 
 WIDE = 0.1  # of distance and speed: the sigma of a guess, which says where to begin and nothing else
 
@@ -192,6 +195,8 @@ def _known(
     mean[own] = values
     P[np.ix_(own, own)] = J @ earlier.covariance[np.ix_(where, where)] @ J.T
     problem = replace(problem, prior=Gaussian(mean, P), prior_time=t, parameters=parameters)
+    from piazzi.estimate.propagation import propagate
+
     found = propagate(problem, np.array([first]))
     return problem, (found.mean[0], root_of(found.covariance[0]))
 
@@ -312,7 +317,7 @@ def follow(problem: Problem, times: Array, first: Array, step: float) -> tuple[A
 def _backwards(problem: Problem, times: Array, first: Array, step: float) -> tuple[Array, Array]:
     """The same where times decrease: kernels end steps at manoeuvres on the way forwards only, so that these are nodes."""
     edges = np.array([m.time for m in problem.manoeuvres])
-    nodes = np.unique(np.concatenate([times, edges[(edges < times[0]) & (edges > times[-1])]]))[::-1]
+    nodes = distinct(np.concatenate([times, edges[(edges < times[0]) & (edges > times[-1])]]))[::-1]
     states, Phi = follow(replace(problem, manoeuvres=()), nodes, first, step)
     where = np.searchsorted(-nodes, -times)
     total = np.empty((len(times) - 1, *Phi.shape[1:]))

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.earth import Epoch
 from piazzi.earth.constants import SPEED_OF_LIGHT
 from piazzi.earth.geodetic import position_to_geodetic
@@ -71,7 +72,7 @@ def _joined(given: Sights, tracking: Tracking, which: Array) -> tuple[Rows, Arra
     for s, station in enumerate(given.stations):
         own = np.flatnonzero(which == s)
         if len(own) > MOST_ROWS:
-            own = own[np.unique(np.linspace(0, len(own) - 1, MOST_ROWS).astype(int))]
+            own = own[distinct(np.linspace(0, len(own) - 1, MOST_ROWS).astype(int))]
         if len(own):
             found += _of_station(given, station, t[own], z[own], own)
     if not found:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.earth import Epoch, Place, Station, StationList, Weather, ilrs_stations, mpc_stations, read_stations
 from piazzi.formats import TAGS, Observations
 from piazzi.problem.checks import Array
@@ -166,7 +167,7 @@ def with_station_sigmas(observations: Observations, sites: StationList | None) -
     if sites is None or not np.isnan(sigma).any():
         return sigma
     sigma = sigma.copy()
-    for i in np.unique(observations.station):
+    for i in distinct(observations.station):
         site = None if i < 0 else matched(observations.participants[i], sites)
         for kind, value in (site.sigma if site else {}).items():
             own = np.isnan(sigma) & (observations.station == i) & observations.of_kind(kind)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.centres import EARTH, SUN, Centre
 from piazzi.determination.guesses import Guess
 from piazzi.determination.initial import THROUGH, first_stretch, initial_orbits
@@ -40,7 +41,7 @@ def first_look(seen: Measured) -> Guess:
     kept = first_stretch(rows.t, EARTH.stretch)
     coarse = replace(rows, sigma=np.where(rows.kind[:, None] == DIRECTION, np.hypot(rows.sigma, AIR), rows.sigma))
     search = two_body_modes(coarse.of(kept), EARTH.region, motion=MOTION)
-    if not search.modes and len(np.unique(rows.t)) < 3:  # anything will do: what they determine is found out later
+    if not search.modes and len(distinct(rows.t)) < 3:  # anything will do: what they determine is found out later
         return nominal(seen)
     if not search.modes:
         raise ValueError(_nothing(len(kept)))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.determination.analysis import Analysis, of_orbit
 from piazzi.determination.completeness import left_out, words_for
 from piazzi.determination.faults import Faults
@@ -112,7 +113,7 @@ def alone(given: Setup) -> Sentence:
     test = "two fixes of position or more leave one orbit"
     wide = [len(s.noise) >= 3 and s.sensor.startswith("position") for s in given.problem.stations]
     fixed = np.array(wide)[given.tracking.stations_of(given.problem)] & np.isfinite(given.tracking.values).any(axis=1)
-    if np.unique(given.tracking.row_times[fixed]).size >= 2:
+    if distinct(given.tracking.row_times[fixed]).size >= 2:
         return Sentence(True, 0.0, test, "Alone: positions were measured directly, so no other orbit fits them.")
     if given.guess.orbits is None:
         return Sentence(None, None, test, "Alone: twins were not looked for.")

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from piazzi.arrays import median
 from piazzi.determination.analysis import analysed
 from piazzi.determination.setup import Setup
 from piazzi.estimate.chi_square import quantile
@@ -36,7 +37,7 @@ def with_white_fixes(given: Setup) -> Setup:
     spare = np.zeros(len(given.rows), dtype=np.bool_)
     spare[own] = True
     spare[own[::stride]] = False
-    apart = float(np.median(np.diff(given.tracking.row_times[own[::stride]])))
+    apart = median(np.diff(given.tracking.row_times[own[::stride]]))
     text = f"fixes are correlated: one in {stride} is used, {number(apart / 60.0, 2)} min apart, which are not"
     return replace(given, spare=spare, assumed=(*given.assumed, text))
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, distinct
 from piazzi.earth import scales
 from piazzi.earth.dates import Reading, read_date
 from piazzi.earth.epoch import Epoch, orientation
@@ -48,7 +48,7 @@ def read_dates(texts: Array, scale: str | None = None, place: Callable[[int], st
     found, day, seconds, fraction, tail = _regular(texts)
     kinds = np.zeros(J, dtype=np.int64)
     known: list[str] = []
-    for value in np.unique(tail[found]):
+    for value in distinct(tail[found]):
         rows = np.flatnonzero(found & (tail == value))
         text = _text(texts[rows[0]])
         if text.rstrip()[-6:-5] in ("+", "-") and text.rstrip()[-3:-2] == ":":

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from math import ceil, log, sqrt
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,13 +19,15 @@ from piazzi.earth.finding import check_kernel, found
 from piazzi.earth.force_options import TIDES
 from piazzi.earth.forces import Forces
 from piazzi.earth.scales import Orientation
-from piazzi.earth.space_weather import SpaceWeather, read_space_weather
 from piazzi.earth.subdaily import SubdailyEOP
-from piazzi.earth.thermosphere import Thermosphere
 from piazzi.earth.tides import RADIUS
 from piazzi.opening import opened
 from piazzi.text import brief, nearest
 from piazzi.units import Units, is_quantity
+
+if TYPE_CHECKING:
+    from piazzi.earth.space_weather import SpaceWeather
+    from piazzi.earth.thermosphere import Thermosphere
 
 DEGREES = (8, 12, 20, 40, 70)
 USUAL_TIDES = ("solid", "k1")  # without the second LAGEOS-2 moves by 1.6 sigma in three days, Stella by 2.2
@@ -89,6 +91,8 @@ class ForceChoice:
         weather = self.weather or next(found("weather"), None)
         if weather is None:
             raise ValueError("drag 'msis' needs space weather: give weather=FILE, or get it by: piazzi data get weather")
+        from piazzi.earth.thermosphere import Thermosphere
+
         return Thermosphere(epoch, orbit, weather, at)
 
     def __str__(self) -> str:
@@ -241,6 +245,8 @@ def read_data(name: str, value: Any, folder: Path) -> Any:
         check_kernel(path)
         return path
     if name == "weather":
+        from piazzi.earth.space_weather import read_space_weather
+
         return read_space_weather(folder / str(value))
     return _orientation(value, folder)
 

@@ -9,9 +9,9 @@ from math import cos, exp, radians, sin
 
 from piazzi.earth.atmosphere import BOTTOM, BOTTOM_SCALES, TOP, TOP_SCALES
 from piazzi.earth.force_text import EARTH_RADIUS, FLATTENING, SPIN, Force
-from piazzi.earth.thermosphere import TERMS as AIR_TERMS
 from piazzi.model.functions import Signature
 
+AIR_TERMS = 8  # of the polynomials of a thermosphere
 # Height (km), density (kg/m3) and scale height (km): U.S. Standard Atmosphere 1976 and CIRA-72
 ATMOSPHERE = (
     (100, 5.297e-7, 5.877), (110, 9.661e-8, 7.263), (120, 2.438e-8, 9.473), (130, 8.484e-9, 12.636), (140, 3.845e-9, 16.149),

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, distinct
 from piazzi.earth.epoch import Epoch, pairs
 from piazzi.earth.geodetic import geodetic_to_position, position_to_geodetic
 from piazzi.text import brief, nearest
@@ -136,7 +136,7 @@ class Station:
         seconds = whole + fraction
         result = np.empty((*seconds.shape, 3))
         chosen = _latest(self.coordinates, seconds)
-        for i in np.unique(chosen):
+        for i in distinct(chosen):
             here = chosen == i
             marker = self.coordinates[i]
             result[here] = self._instrument(marker.point, seconds[here], marker.at(seconds[here]))

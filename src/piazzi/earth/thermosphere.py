@@ -14,9 +14,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, distinct
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import gravity_field
+from piazzi.earth.force_air import AIR_TERMS
 from piazzi.earth.geodetic import position_to_geodetic
 from piazzi.earth.rotation import rotation
 from piazzi.earth.space_weather import SpaceWeather, read_space_weather
@@ -28,7 +29,6 @@ SCALE_HEIGHTS = 3.0
 REMAKE = 0.2  # scale heights by which an orbit may leave the arc before the table is made again
 VERSION = 2.1
 POWERS = 5
-TERMS = 8
 _STEP = 60.0  # s, of the arc
 _SPAN = 10e3  # m, over which the scale height is taken
 _NODES = np.cos(np.pi * (np.arange(11) + 0.5) / 11)
@@ -52,7 +52,7 @@ class Thermosphere(Tabulated):
         Where `pymsis` is missing (``pip install 'piazzi[msis]'``), or the space weather does not have a date.
     """
 
-    TERMS: ClassVar[int] = TERMS
+    TERMS: ClassVar[int] = AIR_TERMS
     LENGTH: ClassVar[float] = DAY / 288
     COLUMNS: ClassVar[int] = POWERS + 2
 
@@ -115,7 +115,7 @@ class Thermosphere(Tabulated):
         t = t - self.orbit_time
         day = np.floor(t / DAY)
         out = np.empty((len(t), 3))
-        for k in np.unique(day):
+        for k in distinct(day):
             rows = day == k
             states = _day_of_arc(tuple(self.orbit), int(k))
             s = (t[rows] - k * DAY) / _STEP

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from piazzi.arrays import median
 from piazzi.estimate.estimator import Estimate, Estimator
 from piazzi.estimate.kalman import ExtendedKalmanFilter
 from piazzi.estimate.substeps import FINER, StepError
@@ -102,7 +103,7 @@ def _lost(estimate: Estimate, truth: Array | None) -> tuple[float, str]:
     for what, (off, variance) in found.items():
         there = np.isfinite(off) & np.isfinite(variance) & (variance > 0)
         with np.errstate(over="ignore"):
-            typical = float(np.median((off[there] / np.sqrt(variance[there])) ** 2)) if there.any() else 0.0
+            typical = median((off[there] / np.sqrt(variance[there])) ** 2) if there.any() else 0.0
         if typical > LOST:
             return typical**0.5, f"half of its {what} are beyond {typical**0.5:.2g} sigma"
     return 0.0, ""

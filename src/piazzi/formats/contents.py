@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, distinct
 from piazzi.formats.kinds import KINDS, TAGS
 from piazzi.formats.observations import Observations, Segment
 from piazzi.formats.passes import numbered
@@ -66,7 +66,7 @@ def _kind(rows: Observations, name: str) -> dict[str, Any]:
         "greatest": _finite(np.nanmax(values)) if not np.isnan(values).all() else None,
         "sigmas": len(known),
         "median_sigma": _finite(np.median(known)) if len(known) else None,
-        "stations": [rows.participants[i] for i in np.unique(rows.station[own]) if i >= 0],
+        "stations": [rows.participants[i] for i in distinct(rows.station[own]) if i >= 0],
     }
 
 
@@ -85,7 +85,7 @@ def passes(rows: Observations) -> Iterator[dict[str, Any]]:
         one = {
             "station": _name(rows, rows.station[first]), "object": _name(rows, rows.object[first]),
             "first": _date(rows, first), "last": _date(rows, last), "seconds": float(rows.t[last] - rows.t[first]),
-            "rows": len(part), "kinds": [rows.kinds[i] for i in np.unique(rows.kind[part])],
+            "rows": len(part), "kinds": [rows.kinds[i] for i in distinct(rows.kind[part])],
         }  # fmt: skip
         found.append((float(rows.t[first]), one))
     yield from (one for _, one in sorted(found, key=lambda pair: pair[0]))

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, distinct
 from piazzi.earth import Epoch
 from piazzi.formats.copying import reduced
 from piazzi.formats.kinds import KINDS, TAGS
@@ -197,12 +197,12 @@ class Observations:
     @property
     def stations(self) -> tuple[str, ...]:
         """Names of those who measured, in the order of `participants`."""
-        return tuple(self.participants[i] for i in np.unique(self.station) if i >= 0)
+        return tuple(self.participants[i] for i in distinct(self.station) if i >= 0)
 
     @property
     def objects(self) -> tuple[str, ...]:
         """Names of those who were seen, in the order of `participants`."""
-        return tuple(self.participants[i] for i in np.unique(self.object) if i >= 0)
+        return tuple(self.participants[i] for i in distinct(self.object) if i >= 0)
 
     @property
     def scales(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, median
 
 GAP = 3600.0  # s without a row, behind which another pass begins: a low satellite comes again after 75 min or more
 LONG = 2.0  # times the usual interval: a pause between two blocks of a file that makes them two passes
@@ -33,7 +33,7 @@ def numbered(t: Array, who: Array, block: Array) -> Array:
         until = np.maximum.accumulate(ends[blocks])[:-1]  # of the blocks so far
         steps, apart = np.diff(times), times[1:] > until
         inside = steps[~apart & (steps > 0)]
-        pause = apart & (steps > LONG * np.median(inside)) if len(inside) else np.zeros(len(steps), dtype=np.bool_)
+        pause = apart & (steps > LONG * median(inside)) if len(inside) else np.zeros(len(steps), dtype=np.bool_)
         out[own] = last + 1 + np.concatenate([[0], np.cumsum((steps > GAP) | pause)])
         last = int(out[own[-1]])
     return out

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, distinct
 from piazzi.formats.observations import Observations
 from piazzi.text import brief, nearest
 
@@ -65,7 +65,7 @@ def ramp_of(observations: Observations, participant: str) -> Ramp:
     changes, rates = series(observations, own, "transmit_frequency_rate")
     if not len(times):
         raise ValueError(f"no frequency that {participant} transmitted is given")
-    events = np.unique(np.concatenate([times, changes[changes > times[0]]]))
+    events = distinct(np.concatenate([times, changes[changes > times[0]]]))
     k = np.searchsorted(changes, events, side="right") - 1
     rate = np.where(k >= 0, rates[np.maximum(k, 0)], 0.0) if len(rates) else np.zeros(len(events))
     frequency = np.empty(len(events))

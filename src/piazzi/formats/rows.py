@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.formats.dates import Readings, instants
 from piazzi.formats.kinds import TAGS
 from piazzi.formats.observations import Observations, Segment
@@ -96,7 +97,7 @@ class Rows:
         scale = np.array([s.scale for s in self.segments])[segment]
         epoch = instants(str(scale[0]), Readings(*(part[:1] for part in readings))).epoch
         t = np.empty(len(day))
-        for name in np.unique(scale):
+        for name in distinct(scale):
             here = scale == name
             t[here] = instants(str(name), Readings(*(part[here] for part in readings)), epoch).t
         return Observations(

@@ -8,6 +8,7 @@ from math import isnan
 
 import numpy as np
 
+from piazzi.arrays import distinct
 from piazzi.formats.conventions import RANGES
 from piazzi.formats.kinds import KINDS, TAGS
 from piazzi.formats.observations import Observations
@@ -29,7 +30,7 @@ def csv_text(observations: Observations) -> str:
     rows = observations
     if not len(rows):
         raise ValueError("there are no rows to write")
-    scales = sorted({rows.segments[i].scale for i in np.unique(rows.segment)})
+    scales = sorted({rows.segments[i].scale for i in distinct(rows.segment)})
     if len(scales) > 1:
         raise ValueError(f"a CSV has one time scale, and there are {', '.join(scales)}")
     kinds = [kind for kind in rows.kinds if rows.of_kind(kind).any()]
@@ -72,11 +73,11 @@ def csv_text(observations: Observations) -> str:
 
 def _said(rows: Observations) -> list[tuple[str, str]]:
     """Conventions that are the same for all rows, by the names of `Conventions`."""
-    used = [rows.segments[i] for i in np.unique(rows.segment)]
+    used = [rows.segments[i] for i in distinct(rows.segment)]
     out = [
         (name, {getattr(segment, name) for segment in used}) for name in ("frame", "angles", "interval", "interval_reference")
     ]
     ways = {ends: word for word, ends in RANGES.items()}
     out.append(("range", {ways.get((segment.way, segment.range_is)) for segment in used}))
-    out.append(("tag", {TAGS[i] or None for i in np.unique(rows.tag)}))
+    out.append(("tag", {TAGS[i] or None for i in distinct(rows.tag)}))
     return [(name, str(words.pop())) for name, words in out if len(words) == 1 and None not in words]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, distinct
 from piazzi.formats.kinds import TAGS
 from piazzi.formats.observations import Observations, Segment
 from piazzi.formats.tdm_keywords import ANGLE_KINDS, CORRECTIONS, DEGREE, LIGHT, METADATA, OF_PARTICIPANT, PLAIN, RANGE_FACTORS
@@ -51,9 +51,9 @@ def _groups(observations: Observations) -> Iterator[Array]:
     groups = np.split(order, np.cumsum(np.bincount(group.reshape(-1)))[:-1])
     for g in np.argsort(first):
         own = groups[g]
-        part = _parts([observations.kinds[i] for i in np.unique(observations.kind[own])], observations.kinds)
+        part = _parts([observations.kinds[i] for i in distinct(observations.kind[own])], observations.kinds)
         parts = part[observations.kind[own]]
-        for p in np.unique(parts):
+        for p in distinct(parts):
             yield own[parts == p]
 
 
@@ -102,7 +102,7 @@ def _metadata(rows: Observations, segment: Segment, names: list[str], kinds: lis
     out |= {"MODE": segment.mode.upper()} if segment.mode else {"MODE": "SEQUENTIAL"} if paths else {}
     for keyword, path in zip(("PATH",) if len(paths) == 1 else ("PATH_1", "PATH_2"), paths, strict=False):
         out[keyword] = ",".join(str(names.index(name) + 1) for name in path)
-    tags = {TAGS[i] for i in np.unique(rows.tag)}
+    tags = {TAGS[i] for i in distinct(rows.tag)}
     if segment.tag in ("transmit", "receive") or tags == {"transmit"}:
         out["TIMETAG_REF"] = (segment.tag or "transmit").upper()
     elif segment.tag == "bounce" or "bounce" in tags:

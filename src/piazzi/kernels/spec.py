@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -202,7 +203,6 @@ def _surroundings() -> tuple[str, ...]:
     """
     import platform
     import sys
-    from importlib.metadata import version
 
     import llvmlite.binding as llvm
 
@@ -212,5 +212,17 @@ def _surroundings() -> tuple[str, ...]:
             continue
         text.update(file.name.encode() + b"\0" + file.read_bytes())
     features = llvm.get_host_cpu_features().flatten()
-    packages = [f"{p} {version(p)}" for p in ("numba", "llvmlite", "sympy")]
+    packages = [_release(p) for p in ("numba", "llvmlite", "sympy")]
     return (text.hexdigest(), sys.version, platform.machine(), llvm.get_host_cpu_name(), features, *packages)
+
+
+def _release(package: str) -> str:
+    """A package with its version, by the folder that installers leave beside it: to ask for it takes many imports."""
+    spec = find_spec(package)
+    beside = Path(spec.origin).parents[1].glob(f"{package}-*.dist-info") if spec is not None and spec.origin else ()
+    found = [folder.stem for folder in beside]
+    if len(found) == 1:
+        return found[0]
+    from importlib.metadata import version
+
+    return f"{package}-{version(package)}"

@@ -7,9 +7,10 @@ from itertools import combinations
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, distinct, median
 from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, Fits, Rows, Setting, fitted, squares
-from piazzi.orbit.starts import Moment, Region, classical, linked, moment, sampled
+from piazzi.orbit.region import Region
+from piazzi.orbit.starts import Moment, classical, linked, moment, sampled
 from piazzi.orbit.two_body import propagate_kepler
 from piazzi.text import brief
 
@@ -68,7 +69,7 @@ def two_body_modes(
     motion : m/s^2, what two-body motion lacks: by it rows count less, the farther they are from the epoch
     offset_sigma : of a constant that all rates share, m/s
     """
-    epoch = float(np.median(rows.t)) if epoch is None else epoch
+    epoch = median(rows.t) if epoch is None else epoch
     setting = Setting(region.mu, epoch, offset_sigma=offset_sigma, motion=motion)
     few = thinned(rows, 24)
     moments = _moments(rows, region)
@@ -89,11 +90,11 @@ def two_body_modes(
 def thinned(rows: Rows, most: int) -> Rows:
     """At most so many rows, evenly among those of every kind."""
     picks = []
-    for kind in np.unique(rows.kind):
+    for kind in distinct(rows.kind):
         of = np.flatnonzero(rows.kind == kind)
         of = of[np.argsort(rows.t[of], kind="stable")]
         share = max(3, round(most * len(of) / len(rows)))
-        picks.append(of[np.unique(np.linspace(0, len(of) - 1, min(share, len(of))).astype(int))])
+        picks.append(of[distinct(np.linspace(0, len(of) - 1, min(share, len(of))).astype(int))])
     return rows.of(np.sort(np.concatenate(picks)))
 
 

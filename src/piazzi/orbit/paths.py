@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, distinct
 from piazzi.earth import Epoch, rotation, transform
 from piazzi.earth.forces import STATES
 from piazzi.earth.rotation import frame_named
@@ -52,7 +52,7 @@ class Rows:
     def rows(self) -> Array:
         """Times of all rows, and of all covariances."""
         dated = [arc.covariance_t + (arc.epoch - self.zero) for arc in self.arcs]
-        return np.unique(np.concatenate([*(nodes[0] for nodes in self._nodes), *dated]))
+        return distinct(np.concatenate([*(nodes[0] for nodes in self._nodes), *dated]))
 
     def covered(self, t: Array) -> Array:
         """Whether an arc reaches over each time."""

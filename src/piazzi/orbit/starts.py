@@ -13,11 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from piazzi.arrays import Array
+from piazzi.arrays import Array, distinct
 from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, RATE, Rows
 from piazzi.orbit.from_directions import gauss
 from piazzi.orbit.gooding import gooding
 from piazzi.orbit.lambert import lambert
+from piazzi.orbit.region import Region
 from piazzi.orbit.two_body import propagate_kepler
 
 SAMPLES = {0: 1, 1: 64, 2: 512, 3: 2048, 4: 4096, 5: 8192, 6: 8192}
@@ -25,25 +26,6 @@ LINKED = 4096  # pairs of distances
 SUBSETS = 12  # pairs or triples of rows for the classical methods
 SLOW = 2  # triples that the method of Gooding takes: a tenth of a second each
 _RATIOS = np.array([2.0, 3.0, 5.0, 7.0, 11.0, 13.0])
-
-
-@dataclass(frozen=True)
-class Region:
-    """Which orbits are admissible: mu, lowest and highest distance from the centre (m); whether observers stand on the body."""
-
-    mu: float
-    lowest: float
-    highest: float
-    on_surface: bool = True
-
-    def holds(self, state: Array) -> Array:
-        """Which states (K, 6) are bound, with both apsides inside."""
-        with np.errstate(all="ignore"):
-            r, v2 = np.linalg.norm(state[:, :3], axis=1), np.sum(state[:, 3:] ** 2, axis=1)
-            a = 1.0 / (2.0 / r - v2 / self.mu)
-            h2 = np.sum(np.cross(state[:, :3], state[:, 3:]) ** 2, axis=1)
-            e = np.sqrt(np.maximum(1.0 - h2 / (self.mu * a), 0.0))
-            return np.asarray((a > 0) & (a * (1 - e) > self.lowest) & (a * (1 + e) < self.highest) & np.isfinite(r))
 
 
 def halton(count: int, dimensions: int) -> Array:
@@ -100,9 +82,9 @@ def _line(rows: Rows, which: Array, t: float) -> tuple[Array | None, Array | Non
     if not which.any():
         return None, None
     dt, values = rows.t[which] - t, rows.value[which]
-    if len(np.unique(dt)) < 2:
+    if len(distinct(dt)) < 2:
         return values[np.argmin(np.abs(dt))], None
-    degree = 2 if len(np.unique(dt)) >= 5 else 1
+    degree = 2 if len(distinct(dt)) >= 5 else 1
     scale = np.abs(dt).max()
     found = np.linalg.lstsq(np.vander(dt / scale, degree + 1, increasing=True), values, rcond=None)[0]
     return found[0], found[1] / scale
@@ -247,7 +229,7 @@ def _pairs(t: Array) -> list[tuple[int, int]]:
     """Pairs of indices, from neighbours to both ends."""
     if len(t) < 2:
         return []
-    picks = np.unique(np.linspace(0, len(t) - 1, min(len(t), 5)).astype(int))
+    picks = distinct(np.linspace(0, len(t) - 1, min(len(t), 5)).astype(int))
     pairs = [(0, len(t) - 1), *pairwise(picks.tolist()), *pairwise(range(0, len(t), max(1, len(t) // 4)))]
     return [(i, j) for i, j in dict.fromkeys(pairs) if t[j] > t[i]][:SUBSETS]
 

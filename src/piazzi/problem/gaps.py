@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from piazzi.arrays import median
 from piazzi.problem.problem import Problem
 from piazzi.problem.tracking import Tracking
 
@@ -47,7 +48,7 @@ def passes(problem: Problem, tracking: Tracking, gap: float | None = None) -> li
         if not t.size:
             continue
         steps = np.diff(t)
-        usual = USUAL * float(np.median(steps[steps > 0])) if (steps > 0).any() else np.inf
+        usual = USUAL * median(steps[steps > 0]) if (steps > 0).any() else np.inf
         ends = np.flatnonzero(steps > (usual if gap is None else gap))
         first, last = np.append(0, ends + 1), np.append(ends, len(t) - 1)
         out += [Pass(station.name, float(t[a]), float(t[b]), int(b - a + 1)) for a, b in zip(first, last, strict=True)]

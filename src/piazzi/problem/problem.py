@@ -220,7 +220,14 @@ class Problem(Shown):
         """The problem with the derivatives of its functions' values, for which nothing is compiled; else itself."""
         if not self.approximated:
             return self
-        return replace(self, functions={name: outside.exact(recipe) for name, recipe in self.functions.items()})
+        return self.with_data({name: outside.exact(recipe) for name, recipe in self.functions.items()})
+
+    def with_data(self, functions: Mapping[str, Any]) -> Problem:
+        """The same with other data of some of its functions: what else it is made of was checked when it was made."""
+        found = object.__new__(Problem)
+        found.__dict__.update({name: value for name, value in self.__dict__.items() if name not in ("_told", "approximated")})
+        found.__dict__["functions"] = outside.checked_functions({**self.functions, **functions}, self.model)
+        return found
 
     def with_prior(self, prior: Gaussian, prior_time: float | None) -> Problem:
         """The same with another belief in its states: what else it is made of was checked when it was made.

@@ -1,12 +1,14 @@
 """Problems as files: the built-in ones and a user's own.  `piazzi.scenarios()` gives the built-in ones with their titles."""
 
-import sys
-from types import ModuleType
+from typing import TYPE_CHECKING
 
-from piazzi.scenarios.loader import check, load_scenario, names, show, titles
-from piazzi.scenarios.scenario import Picture, Recording, Scenario
-from piazzi.scenarios.table import Fault, ScenarioError
-from piazzi.scenarios.truth import vary
+from piazzi.faces import Face, lazy
+
+if TYPE_CHECKING:
+    from piazzi.scenarios.loader import check, load_scenario, names, show, titles
+    from piazzi.scenarios.scenario import Picture, Recording, Scenario
+    from piazzi.scenarios.table import Fault, ScenarioError
+    from piazzi.scenarios.truth import vary
 
 __all__ = [
     "Fault",
@@ -23,12 +25,13 @@ __all__ = [
 ]
 
 
-class _Scenarios(ModuleType):
+class _Scenarios(Face):
     """The module, which answers when it is called."""
 
     def __call__(self) -> dict[str, str]:
         """Names of the built-in scenarios, with their titles."""
-        return titles()
+        named: dict[str, str] = self.titles()
+        return named
 
 
-sys.modules[__name__].__class__ = _Scenarios
+lazy(__name__, _Scenarios)
