@@ -154,6 +154,22 @@ def test_what_is_written_is_read_back_with_its_conventions(tmp_path, data_dir):
         assert [text for text in rows.open if "--range" in text or "--sigma" in text] == [], file
 
 
+def test_short_names_of_directions_are_those_written_out(tmp_path):
+    rows = "2020-01-01T00:00:00,A,10,20,0.5\n2020-01-01T00:01:00,A,11,21,0.5\n"
+    files = [
+        "time[UTC],station,azimuth[deg],elevation[deg],sigma_azimuth[deg]\n",
+        "time[UTC],station,Az[deg],EL [deg],sigma_az[deg]\n",
+    ]
+    written, short = (pz.read_tracking(table(tmp_path, head + rows)) for head in files)
+    assert short.kinds == written.kinds == ("azimuth", "elevation")
+    for name in ("value", "sigma", "t"):
+        np.testing.assert_array_equal(getattr(short, name), getattr(written, name))
+    said = pz.read_tracking(table(tmp_path, files[1] + rows), columns="azimuth=Az[deg] ignore=EL")
+    assert said.kinds == ("azimuth",) and said.value[0] == written.value[0]
+    both = pz.read_tracking(table(tmp_path, "time[UTC],station,azimuth[deg],az[deg]\n2020-01-01T00:00:00,A,10,20\n"))
+    assert np.degrees(both.value).tolist() == pytest.approx([10.0]) and any("left out: az" in text for text in both.assumed)
+
+
 @pytest.mark.parametrize(
     ("text", "words", "said"),
     [

@@ -82,10 +82,12 @@ def unseen(fitted: Sentence, held: Held | None) -> Sentence:
     """The sentence on residuals with what became of rows that were predicted by the others."""
     if held is None or not held.groups or not held.freedom:
         return fitted
-    what = {"passes": "passes left out in turn", "last": "the last pass, left out,"}.get(held.how, "the last rows, left out,")
+    what = {"passes": "passes left out in turn are", "last": "the last pass, left out, is"}.get(
+        held.how, "the last rows, left out, are"
+    )
     many = f"{len(held.groups)} " if held.how == "passes" else ""
     found = (
-        f"{many}{what} are predicted with squared errors {number(held.nees, 2)} times what their covariances say "
+        f"{many}{what} predicted with squared errors {number(held.nees, 2)} times what their covariances say "
         f"({held.coverage:.0%} within 95 %)"
     )
     test = f"{fitted.test}; predictions of rows left out, up to {GOOD:g} times their covariances"

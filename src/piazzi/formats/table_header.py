@@ -19,6 +19,7 @@ LATITUDE = ("latitude", "longitude", "height")
 FIX = ("x", "y", "z", "vx", "vy", "vz")
 SIGMA = "sigma "
 MEASURED = tuple(kind for kind in KINDS if not KINDS[kind].auxiliary)
+SHORT: Mapping[str, str] = {"az": "azimuth", "el": "elevation", "ra": "right_ascension", "dec": "declination"}
 KNOWN = (TIME, *PEOPLE, *KINDS, *(SIGMA + kind for kind in MEASURED))
 _LETTERS = re.compile(r"(\d{1,4})-(\d{1,4})", re.ASCII)  # columns of letters, from one to another
 _UNITS = re.compile(rb"\[[^\[\]\n]*\]")
@@ -46,7 +47,8 @@ class Header:
     def named(self, header: list[str]) -> list[str]:
         """Our names of the columns, "" for those that are left out; raises ValueError for what does not fit."""
         self.header = header
-        plain = [_sigma(name) for name in header]
+        said = {parts(name)[0] for pair in self.columns.items() for name in pair}
+        plain = [name if parts(name)[0] in said else _written_out(name, header) for name in map(_sigma, header)]
         out = renamed(plain, KNOWN, self.columns, "is nothing that is measured")
         ours, ignored = [TIME, WEEK, SECONDS, *KNOWN], self.columns.get(IGNORE, "").split(",")
         labels = [name if parts(name)[0] == TIME else parts(name)[0] for name in out]
@@ -106,12 +108,22 @@ def _sigma(name: str) -> str:
     return SIGMA + name[len(SIGMA) :] if name.startswith("sigma_") else name
 
 
+def _written_out(name: str, header: Sequence[str] = ()) -> str:
+    """A name with what `SHORT` stands for, where no other column is called so."""
+    label, unit = parts(name)
+    sigma, kind = (SIGMA, label[len(SIGMA) :]) if label.startswith(SIGMA) else ("", label)
+    written = sigma + SHORT.get(kind.casefold(), kind)
+    if written == label or written in (parts(_sigma(other))[0] for other in header):
+        return name
+    return f"{written}[{unit}]" if unit else written
+
+
 def looks(head: bytes) -> bool:
     """Whether the first bytes of a file are a header with a time and something that is measured."""
     for line in head.removeprefix(b"\xef\xbb\xbf").split(b"\n"):
         if line.strip() and not line.startswith(b"#"):
             cells = _CELLS.split(_UNITS.sub(b"", line))  # a unit may have blanks, as in time[s past DATE]
-            names = {parts(cell.decode("latin-1").strip(' "\r'))[0].casefold() for cell in cells}
+            names = {parts(_written_out(cell.decode("latin-1").strip(' "\r')))[0].casefold() for cell in cells}
             timed = TIME in names or {WEEK, SECONDS} <= names
             return timed and not names.isdisjoint(MEASURED)
     return False
