@@ -16,7 +16,13 @@ NAMES = ("C20", "C21", "S21", "C22", "S22", "C30", "C31", "S33", "C40", "S43", "
 SIZES = {f"delta_{name}": (-1.0) ** i * (i + 1) * 1e-7 for i, name in enumerate(NAMES)}
 
 
-def problem(forces, integrator=None, **given):
+@pytest.fixture
+def uncompiled(monkeypatch):
+    """The same source without compiling it: each model is asked for two accelerations."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+
+
+def problem(forces, **given):
     model = forces.model(parameters=[name for name in given if name not in forces.parameters])
     values = {**forces.values, **dict.fromkeys((n for n in forces.parameters if n not in forces.values), 0.0), **given}
     return pz.Problem(
@@ -41,6 +47,7 @@ def with_coefficients(field, sizes):
     return replace(field, c=c, s=s)
 
 
+@pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("gravity", ["EGM2008", pytest.param("IERS2010", marks=pytest.mark.slow)])
 def test_what_is_added_is_what_another_field_has(gravity):
     forces = bare(gravity=gravity, harmonics=NAMES)
@@ -54,6 +61,7 @@ def test_what_is_added_is_what_another_field_has(gravity):
 
 
 @pytest.mark.slow  # models of their own
+@pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("name", HARMONICS[::7])
 def test_each_alone(name):
     forces = bare(harmonics=(name,))
@@ -66,6 +74,7 @@ def test_each_alone(name):
     np.testing.assert_allclose(found[3:], W.T @ other, atol=3e-15)
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_a_switch_and_what_there_is_not():
     forces = bare(harmonics=("C20",))
     one = problem(forces, delta_C20=1e-6, harmonics_on=0.0)

@@ -276,11 +276,11 @@ def test_a_component_called_like_another_column_is_refused(tmp_path):
 
 
 def test_no_python_runs_row_by_row_through_a_long_file(tmp_path):
-    """Counted, not timed: another hundred thousand rows take a few thousand lines of Python more, all libraries included.
+    """Counted, not timed: another twenty thousand rows take a few hundred lines of Python more, all libraries included.
 
     The careful way, which takes some fifty for each row, shows that they are counted.
     """
-    more, paths = 100_000, (tmp_path / "a.csv", tmp_path / "b.csv")
+    more, paths = 20_000, (tmp_path / "a.csv", tmp_path / "b.csv")
     for i, path in enumerate(paths):
         J = (1 + i) * more
         values = np.random.default_rng(0).normal(size=(J, 2))
