@@ -50,6 +50,13 @@ def problem(model: pz.Model, **changes) -> pz.Problem:
 # ---- the same model in other words ---------------------------------------------------------------------------------------
 
 
+@pytest.fixture
+def uncompiled(monkeypatch):
+    """The same source as compiled, without the wait."""
+    monkeypatch.setenv("PIAZZI_JIT", "0")
+
+
+@pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize(
     "integrator",
     [
@@ -89,9 +96,9 @@ ESTIMATORS = [
 ]
 
 
+@pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=lambda e: type(e).__name__)
-def test_every_estimator_gives_the_same_with_names_and_in_full(estimator, monkeypatch):
-    monkeypatch.setenv("PIAZZI_JIT", "0")  # the same source as compiled, without the wait
+def test_every_estimator_gives_the_same_with_names_and_in_full(estimator):
     full, named = problem(FULL, integrator=pz.RungeKutta4(1)), problem(NAMED, integrator=pz.RungeKutta4(1))
     tracking = pz.simulate(full, np.arange(15) * 0.1, np.random.default_rng(3))
     one, other = estimator.estimate(full, tracking), estimator.estimate(named, tracking)
@@ -101,6 +108,7 @@ def test_every_estimator_gives_the_same_with_names_and_in_full(estimator, monkey
     assert_allclose(other.covariance, one.covariance, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_simulated_tracking_is_the_same():
     one, other = (pz.simulate(problem(m), np.arange(30) * 0.1, np.random.default_rng(5)) for m in (FULL, NAMED))
     assert_allclose(one.values, other.values, rtol=1e-12)
@@ -112,6 +120,7 @@ def test_uncompiled_source_gives_the_same(monkeypatch):
     assert_allclose(problem(NAMED).dynamics_jacobian(np.array([11.0, -3.0, 1.0, 9.0, 0.03]), 0.4), compiled, rtol=1e-14)
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_an_explicit_step_may_use_definitions_of_the_length_of_the_step():
     named = pz.Model(["x", "v"], ["x + move", "v - dt*k*x"], parameters=["k"], definitions={"move": "dt*v"}, discrete=True)
     full = pz.Model(["x", "v"], ["x + dt*v", "v - dt*k*x"], parameters=["k"], discrete=True)
@@ -125,6 +134,7 @@ def test_an_explicit_step_may_use_definitions_of_the_length_of_the_step():
         assert_allclose(one, other, rtol=0, atol=1e-15)
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_a_number_of_a_station_that_is_estimated_is_found_in_definitions():
     stations = [
         pz.Station("one", "radar", noise=np.diag([1e-2, 1e-4]), numbers={"mx": pz.Gaussian(8.0, 0.1), "my": -2.0}),
@@ -137,6 +147,7 @@ def test_a_number_of_a_station_that_is_estimated_is_found_in_definitions():
     assert_allclose(named.measurement_jacobian("two", x, 0.0), full.measurement_jacobian("two", x, 0.0), rtol=1e-13, atol=1e-14)
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_a_rule_of_the_truth_may_use_definitions():
     truth = pz.Truth(accept=("r - 11",))
     p = problem(NAMED, truth=truth)
