@@ -110,7 +110,7 @@ def test_biases_of_passes_are_not_made_of_rows_that_others_may_follow():
 
 @pytest.mark.parametrize("option", ["estimate", "consider"])
 def test_what_no_orbit_has_is_refused_before_one_is_looked_for(option, monkeypatch):
-    monkeypatch.setattr("piazzi.determination.determining.unguided", lambda *_: pytest.fail("looked for orbits"))
+    monkeypatch.setattr("piazzi.determination.unguided.unguided", lambda *_: pytest.fail("looked for orbits"))
     rows = ranges(np.arange(0.0, 1500.0, 300.0), np.zeros(5, dtype=int))
     with pytest.raises(ValueError, match="'nonsense' is no unknown of these forces"):
         prepared(rows, stations="ilrs", **{option: "nonsense=1"})

@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 from piazzi.orbit import propagate_kepler
 from piazzi.orbit.fits import Rows, Setting, fitted, squares
 from piazzi.orbit.modes import density, thinned, two_body_modes
-from piazzi.orbit.starts import Region, halton
+from piazzi.orbit.region import Region
+from piazzi.orbit.starts import halton
 from tests.references.tracks import ABOUT_EARTH, EARTH, RADIUS, TRACKS, solved, track
 
 

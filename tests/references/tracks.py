@@ -11,7 +11,7 @@ import numpy as np
 from piazzi.orbit import propagate_kepler
 from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, RATE, Rows
 from piazzi.orbit.modes import two_body_modes
-from piazzi.orbit.starts import Region
+from piazzi.orbit.region import Region
 
 EARTH, RADIUS, TURN, LIGHT = 3.986004418e14, 6.378e6, 7.292115e-5, 299792458.0
 SUN, AU = 1.32712440018e20, 1.495978707e11
