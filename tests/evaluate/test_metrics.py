@@ -197,6 +197,7 @@ def test_residuals_are_what_the_states_leave_of_the_measurements():
     assert residual_rms(pz.ExtendedKalmanFilter().estimate(problem, tracking)) == {}
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_residuals_by_unit_are_of_the_states_of_the_estimate():
     """Of an estimator that keeps none, too; of components of one unit together; of the rows that it used."""
     sensor = pz.Sensor("both", {"a": "x", "b": "x + 2*y", "turn": "y"}, units={"a": "m", "b": "m", "turn": "rad"})
