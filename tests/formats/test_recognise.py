@@ -101,6 +101,9 @@ def test_what_is_of_no_format_is_refused_with_the_name(tmp_path):
     path.write_text("hello\n")
     with pytest.raises(ValueError, match=r"a\.tdm: line 1: the file is of no format that is known"):
         pz.read_tracking(path)
+    path.write_text("%=SNX 2.01 JCT 20:119:43200 JCT 79:215:00000 20:119:43200 C 01338 2 X V\n")
+    with pytest.raises(ValueError, match=r"give it as --stations .*a\.tdm"):
+        pz.read_tracking(path)
     with pytest.raises(OSError):
         pz.read_tracking(tmp_path / "b.tdm")
 

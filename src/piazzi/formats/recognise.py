@@ -220,6 +220,8 @@ def _format(data: bytes, name: str, named: bool) -> Format:
     if found is None and (doctype := data[:HEAD].find(b"<!DOCTYPE")) >= 0:
         line = data.count(b"\n", 0, doctype) + 1
         raise ValueError(f"{name}: line {line}: the file has a DOCTYPE, which may name other files; it is not read")
+    if found is None and data.startswith(b"%=SNX"):
+        raise ValueError(f"{name}: the file is SINEX, which says where stations are: give it as --stations {name}")
     if found is None and named:
         found = TABLE
     if found is None and data[:1] == b"{" and b"piazzi.determine/" in data[:HEAD]:
