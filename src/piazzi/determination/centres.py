@@ -52,7 +52,9 @@ class Centre:
         return 2.0 * pi / (steps * self.turning(position, velocity))
 
 
-EARTH = Centre("earth", "GCRF", "UTC", Region(GM["earth"], 6378136.3 + 100e3, 1e9), 1e6, 2e9, 4 * 3600.0)
+EARTH = Centre(
+    "earth", "GCRF", "UTC", Region(GM["earth"], 6378136.3 + 100e3, 1e9, bulge=1.0826e-3 * 6378136.3**2), 1e6, 2e9, 4 * 3600.0
+)
 SUN = Centre(
     "sun", "ICRF", "TDB",
     Region(GM["sun"], 0.05 * ASTRONOMICAL_UNIT, 60.0 * ASTRONOMICAL_UNIT, on_surface=False),

@@ -6,7 +6,7 @@ reaches as far as the sigma of its mean motion leaves no doubt of that.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,8 @@ from piazzi.estimate.batch import BatchLeastSquares, undisturbed
 from piazzi.estimate.estimator import Estimate
 from piazzi.evaluate.information import along
 from piazzi.orbit import propagate_kepler
-from piazzi.orbit.modes import SAME, Mode, density
+from piazzi.orbit.fits import DIRECTION, POSITION, Rows
+from piazzi.orbit.modes import SAME, Mode, Search, density, oblate_modes
 from piazzi.problem import Gaussian, Problem, Tracking
 from piazzi.problem.checks import Array
 from piazzi.problem.inputs import prepare
@@ -31,6 +32,9 @@ LONGER = 4.0  # how much longer each next stretch is
 WIDE = 0.3  # of distance and speed: the sigma of where a fit begins
 NEAR = 0.05  # sigma, to which fits are taken: over weeks rounding moves them by hundredths
 LEAST = 1e-6  # probability of an orbit that is told
+MOST = 6  # two-body orbits that are refined, of those that are probable
+FEW = 3  # of those that heed the flattening: where one is right, others fit far worse
+FITS = 3.0  # sigma that residuals of an orbit that fits have at most, root mean square
 KNOWN = np.pi / 3  # rad, sigma of the way round: three of them are half a turn, from which on turns cannot be counted
 
 
@@ -45,11 +49,19 @@ class Refined:
     count: int
     epoch: Epoch
 
+    @property
+    def fits(self) -> bool:
+        """Whether the residuals are not many sigma."""
+        return self.square <= FITS**2 * max(self.count - 6, 1)
+
 
 def refined(
-    problem: Problem, tracking: Tracking, modes: Sequence[Mode], at: float, ends: tuple[float, float], centre: Centre
+    problem: Problem, tracking: Tracking, rows: Rows, search: Search, ends: tuple[float, float], centre: Centre
 ) -> tuple[list[Refined], Array, Beyond | None]:
-    """Fits of the problem from two-body modes at a time, over the stretch between `ends` and then over longer ones.
+    """Fits of the problem from what two-body motion found, over the stretch between `ends` and then over longer ones.
+
+    Where nothing says where the body is and no fit from the modes fits, two-body motion led astray: distances of one pass, to a
+    centimetre, are fitted by a wrong orbit whose errors make up for what that motion lacks.  Then the flattening is heeded.
 
     Returns
     -------
@@ -60,9 +72,19 @@ def refined(
     times = tracking.row_times
     low, high = ends
     keep = (times >= low) & (times <= high)
-    begun = (propagate_kepler(m.state[:3], m.state[3:], centre.mu, float(times[keep].min()) - at) for m in modes)
-    starts = [np.concatenate([r, v, problem.mean[6:]]) for r, v in begun]
-    found = _different(_fits(problem, tracking, keep, starts), observer(problem, tracking, keep))
+
+    def fits(modes: Iterable[Mode]) -> Iterator[Refined]:
+        begun = (propagate_kepler(m.state[:3], m.state[3:], centre.mu, float(times[keep].min()) - search.epoch) for m in modes)
+        return _fits(problem, tracking, keep, (np.concatenate([r, v, problem.mean[6:]]) for r, v in begun))
+
+    tried = [*fits(search.best[:MOST])]
+    if not (any(one.fits for one in tried) or np.isin(rows.kind, (DIRECTION, POSITION)).any()):
+        closer = oblate_modes(rows, search, centre.region)
+        for one in fits((*closer.modes, *closer.others)[:FEW]):
+            tried.append(one)
+            if one.fits:
+                break
+    found = _different(tried, observer(problem, tracking, keep))
     beyond = None
     while found and not keep.all():
         reach = KNOWN / drift(found[0], centre.mu)
@@ -136,7 +158,7 @@ def _carried(problem: Problem, found: Sequence[Refined], first: float, centre: C
     return out
 
 
-def _fits(problem: Problem, tracking: Tracking, keep: Array, starts: Sequence[Array]) -> Iterator[Refined]:
+def _fits(problem: Problem, tracking: Tracking, keep: Array, starts: Iterable[Array]) -> Iterator[Refined]:
     """Fits to the rows to keep (J,), from states (n,) at the first of them.
 
     By batch least squares alone: where it ends from none, the two-body fits that are its starts stand as they are.  The full
@@ -166,7 +188,7 @@ def _square(problem: Problem, tracking: Tracking, estimate: Estimate) -> tuple[f
     return float(np.sum(left[there] ** 2)), int(there.sum())
 
 
-def _different(found: Iterator[Refined], here: Array) -> list[Refined]:
+def _different(found: Iterable[Refined], here: Array) -> list[Refined]:
     """Those that are not the same as a better one, the best first; improbable ones left out."""
     kept: list[Refined] = []
     for one in sorted(found, key=lambda f: f.square):

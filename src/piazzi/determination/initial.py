@@ -11,20 +11,19 @@ from piazzi.arrays import distinct
 from piazzi.determination.approach import part
 from piazzi.determination.beliefs import carried_to
 from piazzi.determination.centres import Centre, centre_of
-from piazzi.determination.extending import LONGER, observer, refined, weighed
+from piazzi.determination.extending import LONGER, MOST, observer, refined, weighed
 from piazzi.determination.initial_result import InitialOrbits, OrbitMode, Parting, UndeterminedError
 from piazzi.determination.orbit_forces import STEPS
 from piazzi.determination.ridge import OPEN, counted, openness, ridge
 from piazzi.determination.sights import observers, rows_of
 from piazzi.orbit import propagate_kepler
 from piazzi.orbit.fits import Rows
-from piazzi.orbit.modes import Mode, Search, two_body_modes
+from piazzi.orbit.modes import Search, two_body_modes
 from piazzi.orbit.region import Region
 from piazzi.problem import Problem, Tracking
 from piazzi.problem.checks import Array
 
 ENOUGH = 5  # rows of a stretch
-MOST = 6  # two-body orbits that are refined
 THROUGH = "no orbit for a whole turn"
 WIDEST = 16.0  # stretches, within which two-body motion still says what to begin with
 
@@ -57,15 +56,14 @@ def initial_orbits(problem: Problem, tracking: Tracking, region: Region | None =
     first, search = _looked(rows, centre.stretch, region)
     if not search.modes and len(distinct(rows.t)) > 2:
         raise ValueError(f"no orbit fits the {len(distinct(index[first]))} rows of the first stretch ({search.starts} starts)")
-    inside = [m for m in search.modes if m.admissible] or list(search.modes)
-    wide, known = openness(inside[0]) if inside else (np.inf, counted(rows.of(first)))
+    wide, known = openness(search.best[0]) if search.best else (np.inf, counted(rows.of(first)))
     ends = float(rows.t[first].min()), float(rows.t[first].max())
-    found, keep, beyond = refined(problem, tracking, inside[:MOST], search.epoch, ends, centre)
+    found, keep, beyond = refined(problem, tracking, rows.of(first), search, ends, centre)
     if wide > OPEN and ((tracking.row_times[keep] <= ends[1]) & (tracking.row_times[keep] >= ends[0])).all():
         what = ridge(rows.of(first), region, problem.epoch, known)
         return InitialOrbits((), search.starts, search.fits, None, centre.name, what, beyond)
     modes = weighed(found, observer(problem, tracking, keep))
-    modes = modes or tuple(_unrefined(problem, search, inside[:MOST], len(distinct(index[first]))))
+    modes = modes or tuple(_unrefined(problem, search, len(distinct(index[first]))))
     modes = tuple(replace(mode, why_not=_why_not(mode.mean, region, centre)) for mode in modes)
     apart = _apart(problem, tracking, modes, centre) if len(modes) > 1 else None
     return InitialOrbits(modes, search.starts, search.fits, apart, centre.name, None, beyond)
@@ -111,8 +109,7 @@ def _looked(rows: Rows, length: float, region: Region) -> tuple[Array, Search]:
     first = first_stretch(rows.t, length, longest)
     search = two_body_modes(rows.of(first), region)
     while len(first) < len(rows) and length < longest:
-        inside = [m for m in search.modes if m.admissible] or list(search.modes)
-        if inside and openness(inside[0])[0] <= OPEN:
+        if search.best and openness(search.best[0])[0] <= OPEN:
             break
         length *= LONGER
         more = first_stretch(rows.t, length, longest)
@@ -152,10 +149,10 @@ def _why_not(state: Array, region: Region, centre: Centre) -> str:
     return "it is not bound" if inverse <= 0.0 else f"it goes farther than {region.highest / 1e3:,.0f} km from the centre"
 
 
-def _unrefined(problem: Problem, search: Search, modes: list[Mode], rows: int) -> Iterator[OrbitMode]:
+def _unrefined(problem: Problem, search: Search, rows: int) -> Iterator[OrbitMode]:
     """Two-body modes as they are, where the full model ended from none."""
     epoch = problem.epoch + search.epoch
-    for mode in modes:
+    for mode in search.best[:MOST]:
         half = np.linalg.lstsq(mode.root[:6, :6], np.eye(6), rcond=None)[0]
         rms = float(np.sqrt(mode.square / max(rows, 1)))
         yield OrbitMode(epoch, mode.state, half @ half.T, mode.probability, rms, rows)

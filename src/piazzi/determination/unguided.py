@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi.arrays import distinct
 from piazzi.determination.centres import EARTH, SUN, Centre
+from piazzi.determination.extending import FITS
 from piazzi.determination.guesses import Guess
 from piazzi.determination.initial import THROUGH, first_stretch, initial_orbits
 from piazzi.determination.initial_result import InitialOrbits, UndeterminedError
@@ -24,7 +25,6 @@ from piazzi.problem import Problem
 MOTION = 1e-2  # m/s^2: what two-body motion lacks in low orbits
 AIR = 1e-3  # rad: aberration and refraction, which are left in for a first look
 SLOW = np.radians(1.0) / 3600.0  # rad/s among the stars: the Moon does half of it
-FITS = 3.0  # sigma that residuals of an orbit that fits have at most, root mean square
 
 
 def first_look(seen: Measured) -> Guess:
@@ -108,13 +108,18 @@ def unguided(seen: Measured, pose: Callable[[Guess], Problem]) -> Guess:
     found: InitialOrbits = initial_orbits(pose(first_look(seen)), seen.tracking)
     if found.ridge is not None:
         raise UndeterminedError(found)
-    if found.beyond is not None:
-        fits = f"an orbit fits {found.modes[0].rows} measurements from {found.modes[0].epoch} on"
-        raise ValueError(f"{fits}, but {found.beyond}: give them apart, or say where to begin with --guess")
     best = found.modes[0]
+    off = f"with residuals of {best.weighted_rms:.2g} sigma" if best.weighted_rms > FITS else ""
+    if found.beyond is not None:
+        far = f"no orbit was found that fits the {best.rows} measurements from {best.epoch} on: the nearest leaves them {off}"
+        fits = far if off else f"an orbit fits {best.rows} measurements from {best.epoch} on"
+        raise ValueError(
+            f"{fits}, {'and' if off else 'but'} {found.beyond}: give them apart, or say where to begin with --guess"
+        )
     if THROUGH in best.why_not:
         raise ValueError(f"the measurements fit no other orbit than one that is {best.why_not}")
     words = "the only orbit that fits" if len(found.modes) == 1 else f"the most probable of {len(found.modes)} orbits that fit"
+    words = f"the nearest orbit that was found, {off}" if off else words
     told = f"{words}, of {found.starts} starts"
     said = (f"the fit begins at {told}",)
     return Guess(best.epoch, best.mean[:3], best.mean[3:], "initial orbits", said, found, seen.about)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, compress
 
 import numpy as np
 
 from piazzi.arrays import Array, distinct, median
 from piazzi.orbit.fits import DIRECTION, POSITION, RANGE, Fits, Rows, Setting, fitted, squares
+from piazzi.orbit.oblate import oblate_fits
 from piazzi.orbit.region import Region
 from piazzi.orbit.starts import Moment, classical, linked, moment, sampled
 from piazzi.orbit.two_body import propagate_kepler
@@ -17,6 +18,7 @@ from piazzi.text import brief
 BEST = 60  # samples that are fitted
 LONG = 120  # steps of the last fits: along a curved valley
 SAME = 25.0  # squared Mahalanobis distance within which two ends are one
+GAP, ENOUGH = 900.0, 4  # s between passes, and rows of one that a search can begin with
 UNLIKELY = 60.0  # by which twice the logarithm of the evidence may be less
 
 
@@ -46,12 +48,22 @@ class Mode:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Modes, the most probable first, and how many starts and fits they come from."""
+    """Modes, the most probable first, and how many starts and fits they come from.
+
+    `others` are ends far less probable, the most probable first.  Where two-body motion lacks more than the sigmas of the rows
+    its residuals say little about which end is nearest to the truth.
+    """
 
     epoch: float
     modes: tuple[Mode, ...]
     starts: int
     fits: int
+    others: tuple[Mode, ...] = ()
+
+    @property
+    def best(self) -> tuple[Mode, ...]:
+        """The modes that are admissible; all where none is."""
+        return tuple(m for m in self.modes if m.admissible) or self.modes
 
     __repr__ = brief
 
@@ -83,8 +95,30 @@ def two_body_modes(
     ends = np.hstack([found.state[best], found.offset[best, None]])
     found = fitted(thinned(rows, 200), ends, replace(setting, steps=LONG))
     nearest = int(np.argmin(np.abs(rows.t - epoch)))
-    weighed = _weighed(found, region, offset_sigma, rows.observer[nearest])
-    return Search(epoch, weighed, len(drawn), len(found.square))
+    modes, others = _weighed(found, region, offset_sigma, rows.observer[nearest])
+    return Search(epoch, modes, len(drawn), len(found.square), others)
+
+
+def oblate_modes(rows: Rows, search: Search, region: Region) -> Search:
+    """The modes of rows about a flattened body, from all ends of a search that did without, and from those of each pass."""
+    setting = Setting(region.mu, search.epoch, steps=LONG)
+    ends = [m.state for m in (*search.modes, *search.others)]
+    parts = _passes(rows)
+    for part in parts if len(parts) > 1 else []:
+        own = two_body_modes(rows.of(part), region)
+        for mode in (*own.modes, *own.others):
+            r, v = propagate_kepler(mode.state[:3], mode.state[3:], region.mu, search.epoch - own.epoch)
+            ends.append(np.concatenate([r, v]))
+    found = oblate_fits(thinned(rows, 200), np.array(ends).reshape(-1, 6), setting, region)
+    nearest = int(np.argmin(np.abs(rows.t - search.epoch)))
+    modes, others = _weighed(found, region, 0.0, rows.observer[nearest])
+    return Search(search.epoch, modes, search.starts, search.fits + len(found.square), others)
+
+
+def _passes(rows: Rows) -> list[Array]:
+    """Indices of the rows of each pass, where they are enough to begin with."""
+    order = np.argsort(rows.t, kind="stable")
+    return [part for part in np.split(order, np.flatnonzero(np.diff(rows.t[order]) > GAP) + 1) if len(part) >= ENOUGH]
 
 
 def thinned(rows: Rows, most: int) -> Rows:
@@ -144,11 +178,11 @@ def density(state: Array, observer: Array) -> Array:
     return np.asarray(-5.0 * np.log(np.maximum(np.linalg.norm(state[:, :3] - observer, axis=1), 1.0)))
 
 
-def _weighed(found: Fits, region: Region, offset_sigma: float, observer: Array) -> tuple[Mode, ...]:
-    """Modes with their evidence; those far below the best are none."""
+def _weighed(found: Fits, region: Region, offset_sigma: float, observer: Array) -> tuple[tuple[Mode, ...], tuple[Mode, ...]]:
+    """Modes with their evidence, and those far below the best."""
     kept = _distinct(found, len(found.square))
     if not kept:
-        return ()
+        return (), ()
     used = slice(7 if offset_sigma > 0 else 6)
     least = 1e-300  # of rows that leave a direction open, where the evidence has no bound
     volume = np.array([np.log(np.maximum(np.abs(np.diag(found.root[k])[used]), least)).sum() for k in kept])
@@ -158,8 +192,9 @@ def _weighed(found: Fits, region: Region, offset_sigma: float, observer: Array) 
     weight = np.where(inside, np.exp(np.minimum(score - top, 0.0)), 0.0)
     share = weight / weight.sum() if weight.sum() > 0 else weight
     order = np.argsort(-score - 1e6 * inside, kind="stable")
-    return tuple(
+    ends = [
         Mode(found.state[k], found.root[k], float(found.offset[k]), float(found.square[k]), float(share[i]), bool(inside[i]))
         for i, k in ((int(i), kept[int(i)]) for i in order)
-        if score[i] > top - 0.5 * UNLIKELY
-    )
+    ]
+    near = score[order] > top - 0.5 * UNLIKELY
+    return tuple(compress(ends, near)), tuple(compress(ends, ~near))

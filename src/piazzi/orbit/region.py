@@ -11,12 +11,16 @@ from piazzi.arrays import Array
 
 @dataclass(frozen=True)
 class Region:
-    """Which orbits are admissible: mu, lowest and highest distance from the centre (m); whether observers stand on the body."""
+    """Which orbits are admissible: mu, lowest and highest distance from the centre (m); whether observers stand on the body.
+
+    `bulge` is J2 times the square of the radius that it belongs to (m^2), about the third axis; zero for a body that is round.
+    """
 
     mu: float
     lowest: float
     highest: float
     on_surface: bool = True
+    bulge: float = 0.0
 
     def holds(self, state: Array) -> Array:
         """Which states (K, 6) are bound, with both apsides inside."""
