@@ -139,7 +139,7 @@ def test_the_orbit_at_any_date_in_any_axes(found):
     when = EPOCH + 3600.0
     state = found.orbit.at(when)
     there = found.orbit.to("ITRF").at(when)
-    r, v = earth.transform(state[:3], state[3:], "GCRF", "ITRF", when)
+    r, v = earth.transform(state[:3], state[3:], "GCRF", "ITRF", when, earth.SubdailyEOP())
     assert_allclose(there, [*r, *v], rtol=1e-12)
     rtn = found.orbit.covariance(when, axes="RTN")
     A = state_axes(state[:3], state[3:])

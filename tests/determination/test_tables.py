@@ -45,7 +45,7 @@ def test_a_table_is_the_same_tracking(sp3, table):
 
 @pytest.mark.parametrize(
     ("left", "asked"),
-    [("--columns", "--columns"), ("--frame", "--frame ITRF"), ("--sigma", "--sigma x=")],
+    [("--columns", "--columns"), ("--frame", "--frame ITRF"), ("--sigma", "x, y, z: --sigma ...m")],
 )  # fmt: skip
 def test_what_the_table_does_not_say_is_asked_for(table, capsys, left, asked):
     words = {"--columns": COLUMNS, "--frame": "ITRF", "--sigma": "0.1m"}

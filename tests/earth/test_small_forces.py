@@ -8,6 +8,7 @@ import pytest
 import piazzi as pz
 from piazzi import earth
 from piazzi.earth.atmosphere import TABLE, HarrisPriester
+from piazzi.earth.force_options import SUNLIGHT
 from piazzi.earth.tidal_harmonics import TidalHarmonics
 
 EPOCH = pz.Epoch("2016-02-13T16:00:00 UTC")
@@ -224,3 +225,44 @@ def test_the_conventional_field():
     c20, c22, s22 = field.c[2, 0], field.c[2, 2], field.s[2, 2]
     assert later.c[2, 1] == pytest.approx(np.sqrt(3) * x * c20 - x * c22 + y * s22, abs=1e-14)
     assert later.s[2, 1] == pytest.approx(-np.sqrt(3) * y * c20 - y * c22 - x * s22, abs=1e-14)
+
+
+LIT = np.array([1.6e7, 1.8e7, -1.0e7, -2600.0, 1700.0, -1200.0])  # the Sun stands to the side
+
+
+def test_sunlight_departs_from_that_on_a_sphere_along_axes_of_sun_and_earth():
+    shares = dict(zip(SUNLIGHT, (0.03, -0.02, 0.05, 0.01, -0.04, 0.02, 0.015, -0.025), strict=True))
+    forces = replace(ALL, empirical=("once-per-rev", "sunlight"), shadows=("earth",))
+    found = alone("radiation_on", LIT, forces=forces, cr_a_m=0.02, **shares)
+    sphere = alone("radiation_on", LIT, forces=forces, cr_a_m=0.02, **dict.fromkeys(SUNLIGHT, 0.0))
+    r, v = LIT[:3], LIT[3:]
+    e = earth.body("sun", EPOCH + T)[0] - r
+    e /= np.linalg.norm(e)
+    up, ahead = r / np.linalg.norm(r), np.cross(np.cross(r, v), r)
+    ahead /= np.linalg.norm(ahead)
+    panel = np.cross(e, up)
+    y = panel / np.hypot(np.linalg.norm(panel), 0.05)
+    c, s = e @ up, e @ ahead
+    toward = shares["light_d_cos"] * c + shares["light_d_sin"] * s
+    toward += shares["light_d_cos2"] * (c**2 - s**2) + shares["light_d_sin2"] * 2 * c * s
+    across = shares["light_b"] + shares["light_b_cos"] * c + shares["light_b_sin"] * s
+    share = toward * e + shares["light_y"] * y + across * np.cross(e, y)
+    size = np.linalg.norm(sphere)
+    assert size > 8e-8
+    np.testing.assert_allclose(sphere, -size * e, rtol=0, atol=1e-5 * size)
+    np.testing.assert_allclose(found - sphere, size * share, rtol=0, atol=1e-6 * size)
+
+
+def test_sunlight_in_shares_needs_sunlight_and_has_partials_that_are_differences():
+    with pytest.raises(ValueError, match=r"light_y.*radiation 'cannonball'"):
+        earth.Forces(empirical=("sunlight",))
+    forces = earth.Forces(degree=2, tides=(), radiation="cannonball", empirical=("sunlight",))
+    p = problem(forces, LIT, cr_a_m=0.02, **dict.fromkeys(SUNLIGHT, 0.1))
+    F, step = p.dynamics_jacobian(LIT, T), np.array([1e4] * 3 + [10.0] * 3)
+    for i, h in enumerate(step):
+        d = h * np.eye(6)[i]
+        difference = (p.dynamics(LIT + d, T) - p.dynamics(LIT - d, T)) / (2 * h)
+        off = replace(p, parameters={**p.parameters, **dict.fromkeys(SUNLIGHT, 0.0)})
+        others = (off.dynamics(LIT + d, T) - off.dynamics(LIT - d, T)) / (2 * h)
+        own = F[3:, i] - off.dynamics_jacobian(LIT, T)[3:, i]
+        np.testing.assert_allclose(own, (difference - others)[3:], rtol=1e-4, atol=1e-20)

@@ -28,7 +28,7 @@ def arc(step=60.0, count=121, velocity=True, offset=(0.0, 0.0, 0.0), frame="GCRF
     moved = np.einsum("kij,i->kj", orbit_axes(r, v), np.asarray(offset, dtype=float))
     r = r + moved + (0.0 if noise is None else noise)
     if frame != "GCRF":
-        r, v = earth.transform(r, v, "GCRF", frame, [START + float(x) for x in t])
+        r, v = earth.transform(r, v, "GCRF", frame, [START + float(x) for x in t], earth.SubdailyEOP())
     given = {"velocity": v} if velocity else {}
     return Arc(epoch=START, t=t, position=r, frame=frame, centre="EARTH", scale="UTC", name="X", **given, **more)
 

@@ -11,11 +11,11 @@ import numpy as np
 from piazzi.determination import motion
 from piazzi.determination.burns import UNPLANNED, Burn
 from piazzi.determination.motion import Extra, Numbers
-from piazzi.determination.orbit_forces import ACCELERATION, COEFFICIENTS, Chosen
+from piazzi.determination.orbit_forces import COEFFICIENTS, Chosen, usual_sigma
 from piazzi.determination.physical import by_shares
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import DV, Asked, of_parameters
-from piazzi.earth.force_options import CONSTANT, ONCE_PER_REV
+from piazzi.earth.force_options import CONSTANT, ONCE_PER_REV, SUNLIGHT, grouped
 from piazzi.earth.forces import unit_of
 from piazzi.problem import Gaussian
 
@@ -53,7 +53,7 @@ def _one(name: str, one: Asked, chosen: Chosen, seen: Measured, numbers: Numbers
         return Extra()
     if one.what.is_process:
         relative = name in COEFFICIENTS.values()
-        usual = SHARES.get(name, ACCELERATION)
+        usual = SHARES.get(name, usual_sigma(name))
         steady = usual if one.what.sigma is None else one.what.size("", 0.0) if relative else _in_si(one, name)
         if name not in numbers.roles:
             numbers.roles[name] = "fixed"
@@ -67,7 +67,7 @@ def _before(name: str, one: Asked, numbers: Numbers) -> Gaussian:
     """The belief about a parameter before the measurements; a sigma of coefficients is a share of them."""
     old = numbers.values.get(name)
     mean = float(np.ravel(old.mean)[0]) if isinstance(old, Gaussian) else float(old or 0.0)
-    usual = float(np.ravel(old.covariance)[0]) ** 0.5 if isinstance(old, Gaussian) else 0.5 * abs(mean) or ACCELERATION
+    usual = float(np.ravel(old.covariance)[0]) ** 0.5 if isinstance(old, Gaussian) else 0.5 * abs(mean) or usual_sigma(name)
     if one.what.sigma is None or one.what.is_process:
         return Gaussian(mean, usual**2)
     if name in COEFFICIENTS.values():
@@ -84,16 +84,19 @@ def _in_si(one: Asked, name: str) -> float:
 
 
 def _with_accelerations(chosen: Chosen, given: Sequence[Asked]) -> Chosen:
-    """The forces with those accelerations along R, T and N that are asked for and that they have not."""
-    known = (*CONSTANT, *ONCE_PER_REV)
+    """The forces with those empirical accelerations that are asked for and that they have not."""
+    known = (*CONSTANT, *ONCE_PER_REV, *SUNLIGHT)
     new = [one.what.name for one in given if one.what.name in known and one.what.name not in chosen.forces.empirical]
-    if not new:
-        return chosen
+    return with_empirical(chosen, new) if new else chosen
+
+
+def with_empirical(chosen: Chosen, new: Sequence[str]) -> Chosen:
+    """The forces with further empirical accelerations, which are zero."""
     forces = replace(chosen.forces, empirical=(*chosen.forces.empirical, *new))
-    values = {**chosen.choice.values, **dict.fromkeys(new, 0.0), "empirical_on": 1.0}
-    facts: dict[str, Any] = {**chosen.facts, "empirical": list(forces.empirical)}
-    choice = replace(chosen.choice, forces=forces, values=values, assumed=())
-    return replace(chosen, choice=choice, values={**dict.fromkeys(new, 0.0), "empirical_on": 1.0, **chosen.values}, facts=facts)
+    zero = dict.fromkeys(new, 0.0) | {name: value for name, value in forces.values.items() if name == "empirical_on"}
+    facts: dict[str, Any] = {**chosen.facts, "empirical": grouped(forces.empirical)}
+    choice = replace(chosen.choice, forces=forces, values={**chosen.choice.values, **zero})
+    return replace(chosen, choice=choice, values={**zero, **chosen.values}, facts=facts)
 
 
 def _sudden(one: Asked) -> Burn:

@@ -15,7 +15,8 @@ from piazzi.determination.case import OPTIONS, Case
 from piazzi.determination.fit import DEFAULT
 from piazzi.determination.setup import Setup
 from piazzi.earth import Epoch, ForceChoice, Forces
-from piazzi.earth.defaults import DATA
+from piazzi.earth.defaults import DATA, SPHERE
+from piazzi.earth.force_options import SUNLIGHT
 from piazzi.formats import KINDS, Observations
 from piazzi.io.atomic import atomic_path
 from piazzi.scenarios.earth_functions import written_orientation
@@ -96,6 +97,8 @@ def _forces(choice: Any, folder: Path) -> Any:
     if not isinstance(choice, ForceChoice):
         return choice
     forces, usual = choice.forces, Forces()
+    if not choice.sphere:  # shares of sunlight were added where they matter, and are again
+        forces = replace(forces, empirical=tuple(name for name in forces.empirical if name not in SUNLIGHT))
     table: dict[str, Any] = {}
     for field in fields(Forces):
         value = getattr(forces, field.name)
@@ -105,13 +108,14 @@ def _forces(choice: Any, folder: Path) -> Any:
             raise ValueError("the case cannot be written to a file: the field of its forces is known in Python only")
         table[field.name] = _plain(field.name, value, folder if field.name == "gravity" else None)
     open_ = {text.partition(" = ")[0] for text in choice.assumed}
-    own = {k: float(v) for k, v in choice.values.items() if k not in open_ and forces.values.get(k) != v}
-    return {**table, **own, **_data(choice)}
+    known = set(forces.parameters) - open_
+    own = {k: float(v) for k, v in choice.values.items() if k in known and forces.values.get(k) != v}
+    return {**table, **own, **_data(choice), **({} if choice.sphere else {SPHERE: False})}
 
 
 def _data(choice: ForceChoice) -> dict[str, Any]:
     """Files of data that were named, and constants of the orientation."""
-    found: dict[str, Any] = {} if choice.eop is None else {"eop": written_orientation(choice.eop)}
+    found: dict[str, Any] = {} if choice.forces.about == "sun" else {"eop": written_orientation(choice.eop)}
     for name in DATA:
         value = getattr(choice, name)
         if value is not None and name not in found:

@@ -28,8 +28,9 @@ from piazzi.determination.instruments import with_instruments
 from piazzi.determination.orbit_forces import Chosen, check_forces, chosen_forces, orientation_of
 from piazzi.determination.partners import Partner, check_partners, partners_of, with_partners
 from piazzi.determination.result import Determination
-from piazzi.determination.sensing import Measured, measured, of_object, oriented
+from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.determination.setup import Setup, at_last_used, posed, setup
+from piazzi.determination.sunlight import with_sunlight
 from piazzi.determination.unknowns import BIAS, CLOCK, SCALE, asked
 from piazzi.determination.verdict import verdict
 from piazzi.determination.whiteness import with_white_fixes
@@ -161,7 +162,7 @@ def prepared(*tracking: Any, case: Case | None = None, **words: Any) -> Setup:
 def ready(given: Setup) -> Setup:
     """The set-up near its answer, with the noise that it shows: of the air where drag matters, of stations, of fixes."""
     near = approached(given)
-    found = with_density(near)
+    found = with_sunlight(with_density(near))
     return with_white_fixes(with_wider_biases(near if found is near else refined(found)))
 
 
@@ -192,7 +193,6 @@ def read(
     seen, begin = _seen(rows, case, earlier, any(one.what.kind == CLOCK for one in wanted), partners)
     if seen.about != "sun":
         check_forces(case.forces)  # an orbit that they are for may be long in coming
-    seen = oriented(seen, orientation_of(case.forces))
     own = [one for one in wanted if one.what.kind in INSTRUMENTS]
     common = pass_biases(seen, own) if passes else []
     seen = with_instruments(seen, [*own, *common])
@@ -248,6 +248,7 @@ def _seen(
             about=about,
             antenna=case.antenna,
             partners=partners,
+            eop=orientation_of(case.forces),
         )
 
     seen = by(case.about or "earth")

@@ -131,7 +131,7 @@ def _about_its_row(context: Context, row: int, angles: str | None) -> Standing:
     r = np.tile(observations.places[observations.place[row]], (len(dates), 1))
     v = np.zeros_like(r)
     if str(observations.extra["place_axes"][row]) == "ITRF":
-        r, v = (np.asarray(a) for a in transform(r, v, "ITRF", "GCRF", dates))
+        r, v = (np.asarray(a) for a in transform(r, v, "ITRF", "GCRF", dates, context.eop))
     elif angles == "apparent":
         raise ValueError(f"{context.where}apparent directions from space depend on a velocity that the file does not say")
     if context.about == "sun":

@@ -96,7 +96,7 @@ def solution(found: Any) -> tuple[Array, Array]:
     if not (np.isfinite(mean).all() and np.isfinite(P).all()):
         return np.full(len(mean), np.nan), np.full(P.shape, np.nan)
     values, J = said(found.problem, mean)
-    J[:6, :6] = jacobian(found.frame, found.epoch)
+    J[:6, :6] = jacobian(found.frame, found.epoch, found.orbit.eop)
     values[:6] = J[:6, :6] @ mean[:6]
     return values, transform_root(definite_root(P), J)
 

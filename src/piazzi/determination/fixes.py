@@ -12,6 +12,7 @@ from piazzi.determination.parts import Part
 from piazzi.determination.sites import Context
 from piazzi.earth import rotation, sensors, transform
 from piazzi.earth.rotation import TURNING, frame_named
+from piazzi.earth.scales import Orientation
 from piazzi.formats import Observations
 from piazzi.model import Sensor
 from piazzi.problem.checks import Array
@@ -75,9 +76,9 @@ def _part(context: Context, rows: Array, sensor: Sensor) -> Part:
             continue
         dates = [observations.epoch + float(x) for x in t[own]]
         velocity = values[own, 3:] if rows.shape[1] == 6 else None
-        turned = transform(values[own, :3], velocity, frame, "GCRF", dates)
+        turned = transform(values[own, :3], velocity, frame, "GCRF", dates, context.eop)
         values[own] = turned[0] if velocity is None else np.hstack([turned[0], np.asarray(turned[1])])
-        noise[own] = _turned(noise[own], frame, dates)
+        noise[own] = _turned(noise[own], frame, dates, context.eop)
         if velocity is not None and frame in TURNING:
             assumed.append("velocities of fixes are relative to the turning axes")
     if context.antenna is None:
@@ -88,14 +89,14 @@ def _part(context: Context, rows: Array, sensor: Sensor) -> Part:
     return Part(arm, STATION, t, values, noise, rows, numbers=numbers, assumed=tuple(assumed))
 
 
-def _turned(noise: Array, frame: str, dates: Sequence[Any]) -> Array:
+def _turned(noise: Array, frame: str, dates: Sequence[Any], eop: Orientation | None) -> Array:
     """Covariances in the GCRF; the same where all directions are alike, so that rows of one sigma have one noise."""
     blocks = range(0, noise.shape[1], 3)
     if all(
         np.allclose(noise[:, k : k + 3, k : k + 3], noise[:, k, k, None, None] * np.eye(3), rtol=1e-12, atol=0) for k in blocks
     ):
         return noise
-    R = rotation(frame, "GCRF", dates)
+    R = rotation(frame, "GCRF", dates, eop)
     out = np.zeros_like(noise)
     for k in blocks:
         out[:, k : k + 3, k : k + 3] = R @ noise[:, k : k + 3, k : k + 3] @ np.swapaxes(R, 1, 2)

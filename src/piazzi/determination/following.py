@@ -21,7 +21,7 @@ from piazzi.determination.live import Live, Taken
 from piazzi.determination.orbit_forces import Chosen, orientation_of
 from piazzi.determination.partners import partners_of, with_partners
 from piazzi.determination.result import Determination
-from piazzi.determination.sensing import Measured, measured, of_object, oriented
+from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.determination.setup import Setup, posed, setup
 from piazzi.determination.sites import sites_of
 from piazzi.determination.unguided import unguided
@@ -194,8 +194,8 @@ class Following:
             rows, self._sites, com=case.com, corrections=case.answers.get("corrections"),
             clocks=any(one.what.kind == CLOCK for one in self._unknowns), name=case.object or first.object or None,
             about=first.about, antenna=case.antenna, epoch=first.epoch, partners=self._partners,
+            eop=orientation_of(case.forces),
         )  # fmt: skip
-        seen = oriented(seen, orientation_of(case.forces))
         return self._live.with_constants(seen) if self._live else seen
 
     # ---- the answer ----------------------------------------------------------------------------------------------

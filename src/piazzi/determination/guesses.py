@@ -15,6 +15,7 @@ from piazzi.determination.centres import centre_of
 from piazzi.determination.words import date, pairs, quantity
 from piazzi.earth import Epoch, transform
 from piazzi.earth.rotation import frame_named
+from piazzi.earth.subdaily import WITHIN_THE_DAY
 from piazzi.formats import Arc, Ephemeris, read_ephemeris
 from piazzi.formats.ephemeris import MeanElements
 from piazzi.opening import opened
@@ -120,7 +121,7 @@ def _of_text(text: str, about: str, where: str) -> Guess:
         r, v = _of_elements(found, centre_of(about).mu, where)
     who = "the guess" if where == "--guess" else where
     assumed = () if "frame" in found else (f"{who} is in the {centre_of(about).frame} (frame=...)",)
-    r, turned = transform(r, v, frame, "GCRF", epoch)
+    r, turned = transform(r, v, frame, "GCRF", epoch, WITHIN_THE_DAY)
     return Guess(epoch, r, np.asarray(turned), where, assumed, about=about)
 
 
@@ -173,7 +174,7 @@ def _of_determination(found: Mapping[str, Any], path: str) -> Guess:
         mean = np.array([float(found["mean"][names.index(n)]) for n in CARTESIAN])
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise ValueError(f"{path}: the determination has no state: {one_error(error)}") from None
-    r, v = transform(mean[:3], mean[3:], frame, "GCRF", epoch)
+    r, v = transform(mean[:3], mean[3:], frame, "GCRF", epoch, WITHIN_THE_DAY)
     return Guess(epoch, r, np.asarray(v), path, about=str(found.get("about", "earth")))
 
 
@@ -204,7 +205,7 @@ def _of_orbit(orbit: Any, near: Epoch, chosen: str | None, path: str, about: str
         found = interpolated(t, r, v if known else None, np.array([at]), arc.degree)
         position, velocity = found.r[0], found.v[0]
     epoch = arc.epoch + at
-    turned = transform(position, velocity, arc.frame, "GCRF", arc.frame_epoch or epoch)
+    turned = transform(position, velocity, arc.frame, "GCRF", arc.frame_epoch or epoch, WITHIN_THE_DAY)
     return Guess(epoch, turned[0], np.asarray(turned[1]), path, about=about)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.course import Course
-from piazzi.determination.sites import sites_of, station_named
+from piazzi.determination.sites import oriented, sites_of, station_named
 from piazzi.determination.words import pairs, quantity
 from piazzi.earth import Epoch, Place, Station, body, rotation, sensors
 from piazzi.earth.constants import SPEED_OF_LIGHT
@@ -157,9 +157,10 @@ def observer(course: Course, station: Station, *, angles: str, axes: str, freque
         sensor.at(None if about == "sun" else station, epoch, 1.0, name=sensor.name, **told.get(sensor.name, {}))
         for sensor in own
     ]
-    problem = replace(
-        base, model=model, stations=[Instruments(**place) for place in places], functions={**base.functions, **needed}
-    )
+    eop = getattr(base.functions.get("fixed"), "eop", None)
+    stations = [Instruments(**{**place, "place": oriented(place.get("place"), eop)}) for place in places]
+    needed = {name: oriented(data, eop) for name, data in needed.items()}
+    problem = replace(base, model=model, stations=stations, functions={**base.functions, **needed})
     kind = FromTheSun if about == "sun" else Observer
     return kind(course, station, problem, np.nan if frequency is None else frequency)
 

@@ -18,6 +18,7 @@ from piazzi.determination.burns import ORBIT, Burn
 from piazzi.determination.ramps import RAMP, pieces, profiles
 from piazzi.determination.unknowns import Asked, Label
 from piazzi.earth import Epoch, rotation
+from piazzi.earth.force_options import SUNLIGHT
 from piazzi.earth.force_text import ORBIT_AXES, along_axes
 from piazzi.model import Model
 from piazzi.model.pruning import used_definitions
@@ -233,7 +234,7 @@ def process_noise(processes: Sequence[Process], states: int) -> Array | None:
 def words_of(name: str) -> str:
     """What a parameter is, in words."""
     known = {"cd_a_m": "drag coefficient times area over mass", "cr_a_m": "coefficient of sunlight times area over mass"}
-    return known.get(name, name.replace("_", " "))
+    return (known | SUNLIGHT).get(name, name.replace("_", " "))
 
 
 def _minute(epoch: Epoch) -> str:

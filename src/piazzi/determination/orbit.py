@@ -12,6 +12,8 @@ import numpy as np
 from piazzi.determination.centres import EARTH, Centre
 from piazzi.earth import Epoch, rotation_rate
 from piazzi.earth.rotation import TURNING, frame_named
+from piazzi.earth.scales import Orientation
+from piazzi.earth.subdaily import WITHIN_THE_DAY
 from piazzi.orbit import Keplerian, state_axes, transform_root
 from piazzi.problem.checks import Array
 from piazzi.text import brief
@@ -39,6 +41,7 @@ class Orbit:
     epoch : where the answer stands
     frame : axes of what it gives
     centre : what it goes about
+    eop : orientation of the Earth, for axes that turn with it; None for the tables
     beliefs : gives states (K, 6) and covariances (K, 6, 6) on the axes of the GCRF at K dates
     """
 
@@ -46,6 +49,7 @@ class Orbit:
     frame: str
     beliefs: Beliefs
     centre: Centre = EARTH
+    eop: Orientation | None = WITHIN_THE_DAY
 
     __repr__ = brief
 
@@ -66,10 +70,10 @@ class Orbit:
         mean, P = (values[0] for values in self.beliefs([when]))
         if axes.upper().startswith(("RTN", "TNW")):
             return transform_root(definite_root(P), state_axes(mean[:3], mean[3:], axes, self.centre.mu))
-        return transform_root(definite_root(P), jacobian(frame_named(axes), when))
+        return transform_root(definite_root(P), jacobian(frame_named(axes), when, self.eop))
 
     def to(self, frame: str) -> Orbit:
-        """The same orbit in other axes."""
+        """The same orbit in other axes; those of the Earth turn as they did for its measurements."""
         return replace(self, frame=frame_named(frame))
 
     def elements(self, epoch: Any = None) -> dict[str, Any]:
@@ -101,7 +105,7 @@ class Orbit:
     def states(self, epochs: Sequence[Epoch]) -> tuple[Array, Array]:
         """States (K, 6) and roots (K, 6, 6) of their covariances at dates, in `frame`."""
         mean, P = self.beliefs(epochs)
-        J = jacobian(self.frame, epochs)
+        J = jacobian(self.frame, epochs, self.eop)
         roots = np.stack([definite_root(one) for one in P]) if len(P) else P
         return np.asarray((J @ mean[..., None])[..., 0]), transform_root(roots, J)
 
@@ -120,9 +124,9 @@ class Orbit:
         return self.epoch if given is None else Epoch(given)
 
 
-def jacobian(frame: str, epoch: Any) -> Array:
+def jacobian(frame: str, epoch: Any, eop: Orientation | None = WITHIN_THE_DAY) -> Array:
     """Derivative (..., 6, 6) of a state in a frame by that in the GCRF, the turning of the axes among it."""
-    R, rate = rotation_rate("GCRF", frame, epoch)
+    R, rate = rotation_rate("GCRF", frame, epoch, eop)
     out = np.zeros((*R.shape[:-2], 6, 6))
     out[..., :3, :3] = out[..., 3:, 3:] = R
     if frame in TURNING:

@@ -13,13 +13,15 @@ from piazzi.determination.motion import Extra
 from piazzi.earth import ForceChoice, Forces, LaserSphere, laser_sphere, read_forces
 from piazzi.earth.defaults import AIR_BELOW, lowest_height
 from piazzi.earth.force_air import air
-from piazzi.earth.force_options import CONSTANT
+from piazzi.earth.force_options import CONSTANT, SUNLIGHT, grouped
 from piazzi.earth.scales import Orientation
 from piazzi.earth.stepping import longest_step
+from piazzi.earth.subdaily import WITHIN_THE_DAY
 from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
 
 ACCELERATION = 1e-7  # m/s2: sigma of a constant acceleration
+DEPARTS = 0.05  # sigma of each share of sunlight: those of GPS satellites go to 0.04
 STEPS = 200  # of order 8 in a turn at the pericentre's rate
 CR, CD = 1.13, 2.2  # coefficients of bodies whose mass and area are known
 AIR = "(variations as Emmert 2015, Adv. Space Res. 56, 773, reviews them)"
@@ -82,10 +84,11 @@ def chosen_forces(
     choice = _choice(given, state)
     forces = choice.forces
     roles, values, assumed = _coefficients(choice, name, mass, area)
+    choice = replace(choice, sphere=choice.sphere or _ratio(name, mass, area)[1] is not None)
     facts = {
         "source": choice.source, "gravity": forces.field.name, "degree": forces.degree, "bodies": list(forces.bodies),
         "tides": list(forces.tides), "relativity": bool(forces.relativity), "radiation": forces.radiation or None,
-        "drag": forces.drag or None, "empirical": list(forces.empirical),
+        "drag": forces.drag or None, "empirical": grouped(forces.empirical),
     }  # fmt: skip
     left_out = {}
     varies, height = None, lowest_height(state[:3], state[3:])
@@ -106,14 +109,19 @@ def chosen_forces(
     return Chosen(choice, roles, values, facts, step, left_out, assumed, air_varies=varies)
 
 
+def usual_sigma(name: str) -> float:
+    """That of an empirical acceleration where none is given (m/s2), or of a share of sunlight."""
+    return DEPARTS if name in SUNLIGHT else ACCELERATION
+
+
 def orientation_of(given: Any) -> Orientation | None:
     """The orientation of the Earth that forces say, which is that of the stations too; None where they say none."""
     if isinstance(given, ForceChoice):
         return given.eop
-    if given is None or isinstance(given, Forces):
-        return None
+    if isinstance(given, Forces):
+        return WITHIN_THE_DAY
     with suppress(ValueError, OSError):  # who makes the forces tells of it
-        return read_forces(str(given), AIR_BELOW).eop
+        return read_forces("default" if given is None else str(given), AIR_BELOW).eop
     return None
 
 
@@ -139,7 +147,7 @@ def _choice(given: Any, state: Array) -> ForceChoice:
     if isinstance(given, ForceChoice):
         return given
     if isinstance(given, Forces):
-        return ForceChoice(given, "given")
+        return ForceChoice(given, "given", eop=WITHIN_THE_DAY)
     try:
         return read_forces("default" if given is None else str(given), lowest_height(state[:3], state[3:]))
     except ValueError as error:
@@ -154,7 +162,9 @@ def _coefficients(
     roles: dict[str, str] = {}
     values: dict[str, Any] = dict(choice.values)
     open_ = {text.partition(" = ")[0] for text in choice.assumed}
-    accelerations = [name for name in choice.forces.parameters if name in open_ and name.partition("_")[0] in CONSTANT]
+    accelerations = [
+        name for name in choice.forces.parameters if name in open_ and name.partition("_")[0] in (*CONSTANT, "light")
+    ]
     own = {*COEFFICIENTS.values(), *accelerations}
     assumed = [text for text in choice.assumed if text.partition(" = ")[0] not in own]
     ratio, sphere = _ratio(name, mass, area)
@@ -174,8 +184,10 @@ def _coefficients(
         values[parameter] = Gaussian(mean, spread**2)
         assumed.append(f"{parameter} is estimated, before the measurements {mean:.3g} +- {spread:.3g} m2/kg")
     for constant in accelerations:
-        roles[constant], values[constant] = "estimated", Gaussian(0.0, ACCELERATION**2)
-        assumed.append(f"{constant} is estimated, before the measurements 0 +- {ACCELERATION:g} m/s2")
+        sigma = usual_sigma(constant)
+        roles[constant], values[constant] = "estimated", Gaussian(0.0, sigma**2)
+        unit = "" if constant in SUNLIGHT else " m/s2"
+        assumed.append(f"{constant} is estimated, before the measurements 0 +- {sigma:g}{unit}")
     return roles, values, tuple(assumed)
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from piazzi.determination.partners import partners_of, with_partners
-from piazzi.determination.sensing import Measured, measured, of_object, oriented
+from piazzi.determination.sensing import Measured, measured, of_object
 from piazzi.earth import Epoch
 from piazzi.estimate.prior import with_prior_at
 from piazzi.formats import read_tracking
@@ -56,12 +57,17 @@ def recorded(path: str | os.PathLike[str], scenario: str | os.PathLike[str], sai
     partners = partners_of(said.participants or usual.participants or None)
     observations = of_object(with_partners(read_tracking(path, **answers), partners), said.chosen or usual.chosen)
     stations = list(said.stations or usual.stations) or None
-    found = measured(observations, stations, corrections=answers.get("corrections"), epoch=_epoch(tables), partners=partners)
+    seen = partial(
+        measured, observations, stations, corrections=answers.get("corrections"), epoch=_epoch(tables), partners=partners
+    )
+    found = seen()
     name = os.path.basename(os.fspath(scenario)).removesuffix(".toml")
     read = None if faults else read_scenario(_with_measurements(tables, found, os.fspath(path)), name, faults)
     if read is None:
         raise ScenarioError(os.fspath(scenario), list(faults))
-    found = oriented(found, getattr(read.problem.functions.get("fixed"), "eop", None))
+    eop = getattr(read.problem.functions.get("fixed"), "eop", None)
+    if eop is not None:
+        found = seen(eop=eop)
     problem = _measuring(read.problem, found)
     tracking = found.tracking
     first = float(tracking.times[0])

@@ -114,7 +114,7 @@ class Determination(Tabled):
         def at(epochs: Sequence[Epoch]) -> tuple[Array, Array]:
             return beliefs(self.setup, self.estimate, epochs)
 
-        return Orbit(self.epoch, self.frame, at, self.setup.measured.centre)
+        return Orbit(self.epoch, self.frame, at, self.setup.measured.centre, self.setup.chosen.choice.eop)
 
     @property
     def modes(self) -> tuple[dict[str, Any], ...]:
@@ -125,7 +125,7 @@ class Determination(Tabled):
         found = [{"probability": first, "mean": self.orbit.at().tolist(), "weighted_rms": self.weighted_rms}]
         for mode in modes[1:]:
             mean = carried(self.setup, mode.epoch, mode.mean)
-            r, v = transform(mean[:3], mean[3:], "GCRF", self.frame, self.epoch)
+            r, v = transform(mean[:3], mean[3:], "GCRF", self.frame, self.epoch, self.orbit.eop)
             mean = np.concatenate([r, np.asarray(v)])
             found.append({"probability": mode.probability, "mean": mean.tolist(), "weighted_rms": mode.weighted_rms})
         return tuple(found)

@@ -20,7 +20,7 @@ from piazzi.determination.phases import phases
 from piazzi.determination.pseudoranges import pseudoranges
 from piazzi.determination.ranging import ranges
 from piazzi.determination.rates import rates
-from piazzi.determination.sites import Context, sites_of, with_station_sigmas
+from piazzi.determination.sites import Context, oriented, sites_of, with_station_sigmas
 from piazzi.determination.unknowns import Label
 from piazzi.earth import Epoch
 from piazzi.earth.scales import Orientation
@@ -108,6 +108,7 @@ def measured(
     antenna: tuple[float, float, float] | None = None,
     epoch: Epoch | None = None,
     partners: Mapping[str, Any] | None = None,
+    eop: Orientation | None = None,
 ) -> Measured:
     """Sensors, stations and tracking of observations of one object.
 
@@ -123,6 +124,7 @@ def measured(
     antenna : where fixes are taken, m from the centre of mass along R, T and N
     epoch : time zero of the problem; default the second in which the first row is
     partners : participants in orbit whose ephemerides are given, by name; see `partners.partners_of`
+    eop : orientation of the Earth, as the forces have it; default the tables
 
     Raises
     ------
@@ -155,7 +157,7 @@ def measured(
     own = known[0] if known else name or ""
     context = Context(
         everything, epoch, sites, own, com, corrections == "applied", corrections == "open", clocks, about, antenna,
-        partners or {},
+        partners or {}, eop,
     )  # fmt: skip
     parts = [part for part in _parts(context, index) if len(part.t)]
     left_out |= context.left
@@ -175,25 +177,15 @@ def measured(
     if any(segment.quality == "degraded" for segment in everything.segments):
         context.said["rows that the file calls degraded are used as the others"] = None
     said = [*everything.assumed, *added, *sorted_, *context.said, *(sites.notes if sites else ())]
-    return Measured(
+    found = Measured(
         everything, context.object, sensors, places, tracking, rows[by_time], labels, epoch,
         {name: value for part in parts for name, value in part.functions.items()},
         {name: value for part in parts for name, value in part.parameters.items()},
         tuple(dict.fromkeys([*said, *(text for part in parts for text in part.assumed)])),
         left_out, about=about,
     )  # fmt: skip
-
-
-def oriented(seen: Measured, eop: Orientation | None) -> Measured:
-    """What was measured from an Earth that is oriented so, as the forces have it; as it is for None."""
-    if eop is None:
-        return seen
-
-    def turned(data: Any) -> Any:
-        return replace(data, eop=eop) if hasattr(data, "eop") else data
-
-    stations = tuple(replace(station, place=turned(station.place)) for station in seen.stations)
-    return replace(seen, stations=stations, functions={name: turned(data) for name, data in seen.functions.items()})
+    stations = tuple(replace(station, place=oriented(station.place, eop)) for station in found.stations)
+    return replace(found, stations=stations, functions={name: oriented(data, eop) for name, data in found.functions.items()})
 
 
 def _silent(observations: Observations) -> dict[str, int]:

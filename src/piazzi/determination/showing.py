@@ -135,7 +135,13 @@ def remarks(facts: Mapping[str, Any]) -> Iterator[str]:
         if forces["degree"]
         else f"the {facts.get('about', 'earth').title()} as a point"
     )
-    names = [field, *forces["bodies"], *(TIDES[t] for t in forces["tides"]), *extra, *forces["empirical"]]
+    names = [
+        field,
+        *forces["bodies"],
+        *(TIDES[t] for t in forces["tides"]),
+        *extra,
+        *("departures of sunlight" if one == "sunlight" else one for one in forces["empirical"]),
+    ]
     yield f"Forces ({forces['source']}): {', '.join(names)}."
     if "against" in facts:
         apart = facts["against"]

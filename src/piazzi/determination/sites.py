@@ -12,6 +12,7 @@ import numpy as np
 
 from piazzi.arrays import distinct
 from piazzi.earth import Epoch, Place, Station, StationList, Weather, ilrs_stations, mpc_stations, read_stations
+from piazzi.earth.scales import Orientation
 from piazzi.formats import TAGS, Observations
 from piazzi.problem.checks import Array
 from piazzi.text import nearest, suggest
@@ -37,6 +38,7 @@ class Context:
     about : what the orbit goes about
     antenna : where fixes are taken, m from the centre of mass along R, T and N, where the user says it
     partners : participants in orbit whose ephemerides are given, by name
+    eop : orientation of the Earth; None for the tables
     left : reasons and counts of rows that makers leave out
     """
 
@@ -51,6 +53,7 @@ class Context:
     about: str = "earth"
     antenna: tuple[float, float, float] | None = None
     partners: Mapping[str, Any] = field(default_factory=dict)
+    eop: Orientation | None = None
     left: dict[str, int] = field(default_factory=dict)
     said: dict[str, None] = field(default_factory=dict)
 
@@ -147,6 +150,11 @@ def sites_of(given: Any) -> StationList | None:
         found += read_stations(*files).stations
     unique = {station.name: station for station in reversed(found)}  # the first of a name counts
     return StationList(tuple(reversed(unique.values())))
+
+
+def oriented(data: Any, eop: Orientation | None) -> Any:
+    """Data of a function, such as the place of a station, with this orientation of the Earth where they have one."""
+    return replace(data, eop=eop) if eop is not None and hasattr(data, "eop") else data
 
 
 def weather_of(observations: Observations, rows: Array, station: Station, epoch: Epoch) -> tuple[Weather, bool]:

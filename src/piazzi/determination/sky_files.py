@@ -12,6 +12,7 @@ import numpy as np
 
 from piazzi.determination.looking import LIT
 from piazzi.earth import laser_sphere, scales, transform
+from piazzi.earth.subdaily import WITHIN_THE_DAY
 from piazzi.formats.writing import dates, now
 from piazzi.io.atomic import atomic_path
 from piazzi.problem.checks import Array
@@ -89,7 +90,7 @@ def cpf_text(sky: Any) -> str:
     """Positions in the ITRF in the Consolidated Prediction Format, version 2: mean motion of the object, no light time."""
     states, _ = sky.course.beliefs(sky.t)
     epochs = sky.epochs
-    place = transform(states[:, :3], None, "GCRF", "ITRF", epochs)[0]
+    place = transform(states[:, :3], None, "GCRF", "ITRF", epochs, WITHIN_THE_DAY)[0]
     return "\n".join([*_headers(sky), *_rows(sky, place), "99"]) + "\n"
 
 

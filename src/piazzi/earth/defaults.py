@@ -16,10 +16,10 @@ from piazzi.earth.constants import GM
 from piazzi.earth.eop import EOP, read_eop
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.finding import check_kernel, found
-from piazzi.earth.force_options import TIDES
+from piazzi.earth.force_options import TIDES, grouped
 from piazzi.earth.forces import Forces
 from piazzi.earth.scales import Orientation
-from piazzi.earth.subdaily import SubdailyEOP
+from piazzi.earth.subdaily import WITHIN_THE_DAY, SubdailyEOP
 from piazzi.earth.tides import RADIUS
 from piazzi.opening import opened
 from piazzi.text import brief, nearest
@@ -37,7 +37,8 @@ REFLECTED, DRAGGED = 0.013, 0.022  # m2/kg: coefficients 1.3 and 2.2 on 0.01 m2/
 NO = ("no", "none", "off", "false")
 YES = ("yes", "on", "true")
 LARGEST = 2**18  # bytes of a file of forces
-WITHIN_THE_DAY = "subdaily"  # of `eop`: tides of UT1 and of the pole, and libration
+SUBDAILY, DAILY = "subdaily", "daily"  # of `eop`: tides of UT1 and of the pole and libration, and the tables without them
+SPHERE = "sphere"  # whether the body is one to sunlight: else `determine` estimates how it departs from that
 DATA = ("eop", "kernel", "asteroid_kernel", "weather")  # keys beside the fields of Forces
 
 
@@ -46,6 +47,7 @@ class ForceChoice:
     """Forces with numbers of their coefficients and the data that they are computed with.
 
     `values` has every parameter of the forces, those in `assumed` because nobody gave them; `source` says what was chosen by.
+    `sphere` is whether the body is one to sunlight, as it is unless somebody leaves it open.
     `weather` is what `read_space_weather` gives; without it the file that is found where data are looked for.
     """
 
@@ -57,6 +59,7 @@ class ForceChoice:
     asteroid_kernel: str | Path | None = None
     weather: SpaceWeather | None = None
     assumed: tuple[str, ...] = ()
+    sphere: bool = True
 
     __repr__ = brief
 
@@ -101,7 +104,7 @@ class ForceChoice:
         words += ["relativity"] if f.relativity else []
         words += [f"radiation ({f.radiation})"] if f.radiation else []
         words += [f"drag ({f.drag})"] if f.drag else []
-        words += [f"constants along {', '.join(f.empirical)}"] if f.empirical else []
+        words += [f"empirical {', '.join(grouped(f.empirical))}"] if f.empirical else []
         words += ["tides of UT1 and of the pole within the day"] if isinstance(self.eop, SubdailyEOP) else []
         return f"{', '.join(words)} ({self.source})"
 
@@ -121,7 +124,7 @@ def default_forces(height: float) -> ForceChoice:
     The degree of the field is the first of `DEGREES` whose terms are there below `CUT` of the central one, as they fall with
     the power of the radius.  Air counts below 1000 km.
     """
-    return ForceChoice(Forces(**_usual(height)), f"default at {height / 1e3:,.0f} km")
+    return ForceChoice(Forces(**_usual(height)), f"default at {height / 1e3:,.0f} km", eop=WITHIN_THE_DAY, sphere=False)
 
 
 def _usual(height: float) -> dict[str, Any]:
@@ -156,7 +159,7 @@ def read_forces(text: str, height: float) -> ForceChoice:
     if words == ["default"]:
         return default_forces(height)
     if words == ["none"]:
-        return ForceChoice(Forces(degree=0, bodies=(), tides=(), relativity=False), "two bodies")
+        return ForceChoice(Forces(degree=0, bodies=(), tides=(), relativity=False), "two bodies", eop=WITHIN_THE_DAY)
     if len(words) < 2 and "=" not in text:
         if not text.lower().endswith(".toml"):
             raise ValueError(
@@ -165,7 +168,8 @@ def read_forces(text: str, height: float) -> ForceChoice:
             )
         return _of_file(Path(text))
     base = _usual(height) if words[0] == "default" else {}
-    return forces_of(named_values(words[words[0] == "default" :]), Path(), "as given", base)
+    chosen = forces_of(table := named_values(words[words[0] == "default" :]), Path(), "as given", base)
+    return chosen if "eop" in table else replace(chosen, eop=WITHIN_THE_DAY)
 
 
 def named_values(words: Iterable[str]) -> dict[str, str]:
@@ -199,17 +203,25 @@ def forces_of(
     for name, value in table.items():
         if name in known:
             given[name] = force_field(name, value, folder)
-        elif name not in DATA:
+        elif name not in (*DATA, SPHERE):
             values[name] = value
     forces = Forces(**given)
     for name, value in values.items():
         if numbers or name not in forces.parameters:
-            there = [*known, *DATA, *([] if numbers else forces.parameters)]
+            there = [*known, *DATA, SPHERE, *([] if numbers else forces.parameters)]
             hint = f": it belongs to {numbers}" if name in forces.parameters else nearest(name[:60], there)
             raise ValueError(f"forces: {name[:60]} is not known{hint}")
         values[name] = _number(name, value)
     data = {name: read_data(name, table[name], folder) for name in DATA if name in table}
-    return ForceChoice(forces, source, values, **data)
+    return ForceChoice(forces, source, values, sphere=_is_sphere(table.get(SPHERE, base is None or not base)), **data)
+
+
+def _is_sphere(given: Any) -> bool:
+    """Whether the body is a sphere, from text or from what a TOML file has."""
+    word = given.strip().lower() if isinstance(given, str) else given
+    if word not in (*YES, *NO) and not isinstance(word, bool):
+        raise ValueError(f"{SPHERE} is {given!r}; it must be yes or no")
+    return word in YES if isinstance(word, str) else bool(word)
 
 
 def force_field(name: str, value: Any, folder: Path) -> Any:
@@ -251,21 +263,23 @@ def read_data(name: str, value: Any, folder: Path) -> Any:
     return _orientation(value, folder)
 
 
-def _orientation(value: Any, folder: Path) -> Orientation:
-    """A file, `subdaily`, both as `subdaily:FILE`, or a table of constants with the switch `subdaily`."""
+def _orientation(value: Any, folder: Path) -> Orientation | None:
+    """A file, `daily`, `subdaily`, `subdaily:FILE`, or a table of constants with the switch `subdaily`."""
     if not isinstance(value, Mapping):
         word, both, file = str(value).strip().partition(":")
-        if word != WITHIN_THE_DAY:
+        if word == DAILY and not both:
+            return None
+        if word != SUBDAILY:
             return read_eop(folder / str(value))
         return SubdailyEOP(read_eop(folder / file) if both else None)
-    known = [*(f.name for f in fields(EOP)), WITHIN_THE_DAY]
+    known = [*(f.name for f in fields(EOP)), SUBDAILY]
     for key in value:
         if key not in known:
             raise ValueError(f"eop: {key[:60]!r} is not known{nearest(key[:60], known)}")
-    within = value.get(WITHIN_THE_DAY, False)
+    within = value.get(SUBDAILY, False)
     if not isinstance(within, bool):
-        raise ValueError(f"eop: {WITHIN_THE_DAY} is {within!r}; it must be true or false")
-    held = EOP(**{key: _number(key, number) for key, number in value.items() if key != WITHIN_THE_DAY})
+        raise ValueError(f"eop: {SUBDAILY} is {within!r}; it must be true or false")
+    held = EOP(**{key: _number(key, number) for key, number in value.items() if key != SUBDAILY})
     return SubdailyEOP(held) if within else held
 
 
@@ -299,6 +313,7 @@ def _of_file(path: Path) -> ForceChoice:
     flat = {key: value.get("value") if isinstance(value, Mapping) else value for key, value in numbers.items()}
     try:
         chosen = forces_of(earth, path.parent, path.name, numbers="[parameters]")
+        chosen = chosen if "eop" in earth else replace(chosen, eop=WITHIN_THE_DAY)
         known = chosen.forces.parameters  # a scenario has others, of its own equations
         return replace(chosen, values={key: _number(key, value) for key, value in flat.items() if key in known}, assumed=())
     except ValueError as error:

@@ -10,6 +10,18 @@ from piazzi.text import nearest
 USUAL = ("usual",)
 CONSTANT = ("radial", "along", "cross")
 ONCE_PER_REV = tuple(f"{name}_{wave}" for name in CONSTANT for wave in ("sin", "cos"))
+SUNLIGHT = {  # shares of what sunlight does to a sphere, and words for them
+    "light_y": "sunlight across Sun and Earth",
+    "light_b": "sunlight across the Sun, in the plane of Sun and Earth",
+    "light_b_cos": "sunlight in that plane: its cosine over a turn",
+    "light_b_sin": "sunlight in that plane: its sine over a turn",
+    "light_d_cos": "sunlight toward the Sun: its cosine over a turn",
+    "light_d_sin": "sunlight toward the Sun: its sine over a turn",
+    "light_d_cos2": "sunlight toward the Sun: its cosine over half a turn",
+    "light_d_sin2": "sunlight toward the Sun: its sine over half a turn",
+}
+_EMPIRICAL = (*CONSTANT, *ONCE_PER_REV, *SUNLIGHT)
+GROUPS = {"constant": CONSTANT, "once-per-rev": ONCE_PER_REV, "sunlight": tuple(SUNLIGHT)}
 UNITS = {
     "cr_a_m": "m^2/kg", "cd_a_m": "m^2/kg", "air_density": "kg/m^3", "air_height": "m", "air_scale": "m", "dv": "m/s",
     **dict.fromkeys((*CONSTANT, *ONCE_PER_REV, *force_sun.NONGRAVITATIONAL), "m/s^2"),
@@ -23,7 +35,7 @@ _KNOWN: dict[str, dict[str, tuple[str, ...]]] = {
         "tides": tuple(TIDES),
         "relativity": _RELATIVITY,
         "shadows": _SHADOWS,
-        "empirical": ("constant", "once-per-rev", *CONSTANT, *ONCE_PER_REV),
+        "empirical": (*GROUPS, *_EMPIRICAL),
         "harmonics": force_harmonics.HARMONICS,
         "nongravitational": (),
         "asteroids": (),
@@ -62,7 +74,12 @@ def several(about: str, name: str, given: bool | Sequence[str]) -> tuple[str, ..
         if one not in known:
             there = f"there are {', '.join(known)}" if known else f"there are none about the {about.title()}"
             raise ValueError(f"{name} has {one!r}; {there}{nearest(one, known)}")
-    groups = {"constant": CONSTANT, "once-per-rev": ONCE_PER_REV}
-    full = [each for one in given for each in groups.get(one, (one,))]
-    ordered = sorted(full, key=(*CONSTANT, *ONCE_PER_REV).index) if name == "empirical" else full
+    full = [each for one in given for each in GROUPS.get(one, (one,))]
+    ordered = sorted(full, key=_EMPIRICAL.index) if name == "empirical" else full
     return tuple(dict.fromkeys(ordered))
+
+
+def grouped(names: Sequence[str]) -> list[str]:
+    """Empirical accelerations with the names of groups where a whole group is among them."""
+    whole = [group for group, own in GROUPS.items() if set(own) <= set(names)]
+    return [*whole, *(name for name in names if not any(name in GROUPS[group] for group in whole))]

@@ -200,6 +200,41 @@ def empirical(names: Sequence[str]) -> Force:
     return Force("empirical_on", text, total, tuple(names))
 
 
+def sunlight(names: Sequence[str]) -> Force:
+    """What sunlight on a body does that it does not on a sphere, in shares of what it does to that.
+
+    Shares are along D, to the Sun, Y, across the directions of the Sun and the Earth, and B, across both: the axes of a body
+    that turns itself to the Earth and its panels to the Sun.  With `_cos` and `_sin` they go with the components of D along R
+    and T, with `_cos2` and `_sin2` with what twice that angle has.  Where the Sun is above or below the body, Y turns over
+    within some degrees.
+
+    Sources: the model ECOM, Beutler et al. (1994), Manuscripta Geodaetica 19, 367; Springer et al. (1999), GPS Solutions 2, 50;
+    for waves along D Arnold et al. (2015), J. Geodesy 89, 775.
+    """
+    text = ORBIT_AXES | {f"to_sun_{a}": f"sun_d{a}/sun_d" for a in "xyz"}
+    sun = tuple(f"to_sun_{a}" for a in "xyz")
+    text |= _cross("panel", sun, "xyz") | _cross("ahead", ("hx", "hy", "hz"), "xyz")
+    text |= {
+        "panel": f"sqrt(panel_x**2 + panel_y**2 + panel_z**2 + {TURNS_OVER**2!r}*r**2)",
+        "light_cos": "(x*to_sun_x + y*to_sun_y + z*to_sun_z)/r",
+        "light_sin": "(ahead_x*to_sun_x + ahead_y*to_sun_y + ahead_z*to_sun_z)/(h*r)",
+        "light_cos2": "light_cos**2 - light_sin**2",
+        "light_sin2": "2*light_cos*light_sin",
+    }
+    text |= _cross("across", sun, ("panel_x", "panel_y", "panel_z"))
+    sizes: dict[str, list[str]] = {axis: [] for axis in "dyb"}
+    for name in names:
+        _, axis, *wave = name.split("_")
+        sizes[axis].append("*".join([name, *(f"light_{one}" for one in wave)]))
+    text |= {f"light_{axis}_size": " + ".join(parts) or "0" for axis, parts in sizes.items()}
+    text["light_on_body"] = "-light*sun_d"
+    total = tuple(
+        f"light_on_body*(light_d_size*to_sun_{a} + (light_y_size*panel_{a} + light_b_size*across_{a})/panel)" for a in "xyz"
+    )
+    return Force("radiation_on", text, total, tuple(names))  # type: ignore[arg-type]
+
+
+TURNS_OVER = 0.05  # rad: what the angle between Sun and Earth is when a body turns as fast as it can
 ORBIT_AXES = {f"h{a}": f"{b}*v{c} - {c}*v{b}" for a, b, c in ("xyz", "yzx", "zxy")} | {"h": "sqrt(hx**2 + hy**2 + hz**2)"}
 LATITUDE = ORBIT_AXES | {  # its argument, from the ascending node; without an inclination there is none, and no wave
     "node": "r*sqrt(hx**2 + hy**2 + 1e-24*h**2)",

@@ -17,7 +17,7 @@ from piazzi.earth.celestial import Asteroid, GeodesicPrecession
 from piazzi.earth.constants import GM
 from piazzi.earth.epoch import Epoch
 from piazzi.earth.fields import GravityField, gravity_field
-from piazzi.earth.force_options import UNITS, USUAL, options, several
+from piazzi.earth.force_options import SUNLIGHT, UNITS, USUAL, options, several
 from piazzi.earth.force_text import Force
 from piazzi.earth.gravity import Gravity
 from piazzi.earth.scales import Orientation
@@ -53,7 +53,8 @@ class Forces:
     tides : any of "solid", what Sun and Moon raise in the Earth with one Love number; "k1", what those by order and frequency
         add to it; "pole", what the pole's motion does
     empirical : "constant", accelerations (m/s2) along R, T and N that are parameters, "once-per-rev", those that go with sine
-        and cosine of the argument of latitude, or names of single ones
+        and cosine of the argument of latitude, "sunlight", shares of what sunlight does to a sphere that other bodies add to it
+        (see `docs/how-to/forces.md`), or names of single ones
     about : "earth" or "sun"
     nongravitational : any of "A1", "A2", "A3" (m/s2 at one astronomical unit), about the Sun
     asteroids : those that draw the body, about the Sun; they need a kernel of their own
@@ -92,6 +93,8 @@ class Forces:
             if given and (given not in only or self.about == "sun"):
                 choice = " or ".join([*(map(repr, only) if self.about == "earth" else ()), "False"])
                 raise ValueError(f"{name} is {given!r}; it must be {choice}{' about the Sun' * (self.about == 'sun')}")
+        if not self.radiation and (lost := [name for name in self.empirical if name in SUNLIGHT]):
+            raise ValueError(f"empirical has {lost[0]!r}, a share of sunlight: it needs radiation 'cannonball'")
         if self.about == "earth":
             Gravity(self.field, self.degree, self.gradient_degree)  # what is wrong with it is said here
         self.parts  # noqa: B018
@@ -121,7 +124,8 @@ class Forces:
             *([force_text.de_sitter()] if "de-sitter" in relativity else []),
             *([force_text.radiation(self.shadows)] if self.radiation else []),
             *([force_air.drag(self.drag, self.air_height)] if self.drag else []),
-            *([force_text.empirical(self.empirical)] if self.empirical else []),
+            *([force_text.empirical(own)] if (own := [name for name in self.empirical if name not in SUNLIGHT]) else []),
+            *([force_text.sunlight(own)] if (own := [name for name in self.empirical if name in SUNLIGHT]) else []),
         )
 
     @property

@@ -142,6 +142,9 @@ class SubdailyEOP:
         return subdaily(_mjd(whole, fraction, self.daily.ut1_tai(whole, fraction)))
 
 
+WITHIN_THE_DAY = SubdailyEOP()  # by which positions that turn with the Earth are turned: those of files have it
+
+
 def _mjd(whole: Array, fraction: Array, ut1_tai: Array) -> Array:
     """Modified Julian Date of UT1."""
     return np.asarray(51544.5 + (whole + fraction + ut1_tai - scales.TT_TAI) / scales.DAY)

@@ -13,6 +13,7 @@ from piazzi.arrays import Array, distinct
 from piazzi.earth import Epoch, rotation, transform
 from piazzi.earth.forces import STATES
 from piazzi.earth.rotation import frame_named
+from piazzi.earth.subdaily import WITHIN_THE_DAY
 from piazzi.formats import Arc, Ephemeris, read_ephemeris
 from piazzi.formats.ephemeris import MeanElements
 from piazzi.orbit.axes import orbit_axes
@@ -102,7 +103,7 @@ class Rows:
         P = blocks[order][place[found]]
         local = _LOCAL.get(frame.upper())
         dates = [self.zero + float(x) for x in t[found]]
-        R = orbit_axes(r[found], v[found], local) if local else rotation("GCRF", frame, dates)
+        R = orbit_axes(r[found], v[found], local) if local else rotation("GCRF", frame, dates, WITHIN_THE_DAY)
         out[found] = np.swapaxes(R, -1, -2) @ P @ R
 
     def told(self) -> dict[str, Any]:
@@ -237,7 +238,7 @@ def _nodes(arc: Arc, zero: Epoch) -> tuple[Array, Array, Array | None]:
     has_velocity = bool(np.isfinite(v).all())
     if frame_named(arc.frame) not in ("GCRF", "ICRF"):
         dates = [arc.epoch + float(x) for x in t]
-        r, turned = transform(r, v if has_velocity else None, arc.frame, "GCRF", dates)
+        r, turned = transform(r, v if has_velocity else None, arc.frame, "GCRF", dates, WITHIN_THE_DAY)
         v = np.asarray(turned) if has_velocity else v
     return t + (arc.epoch - zero), r, v if has_velocity else None
 

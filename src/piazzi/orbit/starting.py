@@ -9,6 +9,7 @@ import numpy as np
 
 from piazzi.arrays import Array
 from piazzi.earth import Epoch, rotation_rate, transform
+from piazzi.earth.subdaily import WITHIN_THE_DAY
 from piazzi.formats.ephemeris import Arc, MeanElements
 from piazzi.formats.ocm import used_by
 from piazzi.orbit.axes import state_axes
@@ -84,7 +85,7 @@ def _of_arc(arc: Arc, name: str, near: Epoch | None) -> Start:
             raise ValueError(f"{name} has positions of {who} without velocities, and too few to make one of")
         velocity = interpolated(arc.t[rows], arc.position[rows], None, arc.t[[k]], arc.degree).v[0]
         made = ", its velocity from the positions around it"
-    r, v = transform(position, velocity, arc.frame, "GCRF", arc.frame_epoch or epoch)
+    r, v = transform(position, velocity, arc.frame, "GCRF", arc.frame_epoch or epoch, WITHIN_THE_DAY)
     state = np.concatenate([r, np.asarray(v)])
     return Start(who, epoch, state, _covariance(arc, k, state), f"state {k + 1} of {len(arc)} in {name}{made}", used_by(arc))
 
@@ -103,7 +104,7 @@ def _covariance(arc: Arc, k: int, state: Array) -> Array | None:
 
 def in_axes(origin: str, target: str, epochs: list[Epoch]) -> Array:
     """Derivatives (K, 6, 6) of position and velocity in one frame by those in another; velocities are relative to the axes."""
-    R, rate = rotation_rate(origin, target, epochs)
+    R, rate = rotation_rate(origin, target, epochs, WITHIN_THE_DAY)
     out = np.zeros((len(epochs), 6, 6))
     out[:, :3, :3] = out[:, 3:, 3:] = R
     out[:, 3:, :3] = rate

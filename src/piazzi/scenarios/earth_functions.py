@@ -69,16 +69,18 @@ def _written(key: str, value: Any) -> Any:
 
 
 def written_orientation(eop: Any) -> Any:
-    """Constants, or the file that a table is from; raises ValueError for a table that is from none."""
-    from piazzi.earth.defaults import WITHIN_THE_DAY
+    """Constants, the word for the usual tables, or a file; raises ValueError for a table that is from none."""
+    from piazzi.earth.defaults import DAILY, SUBDAILY
     from piazzi.earth.eop import EOP
     from piazzi.earth.subdaily import SubdailyEOP
 
+    if eop is None:
+        return DAILY
     if isinstance(eop, SubdailyEOP):
         if eop.eop is None:
-            return WITHIN_THE_DAY
+            return SUBDAILY
         daily = written_orientation(eop.eop)
-        return f"{WITHIN_THE_DAY}:{daily}" if isinstance(daily, str) else daily | {WITHIN_THE_DAY: True}
+        return f"{SUBDAILY}:{daily}" if isinstance(daily, str) else daily | {SUBDAILY: True}
     if isinstance(eop, EOP):
         return vars(eop)
     if not Path(eop.source).is_file():
