@@ -82,10 +82,10 @@ def test_information_of_passes_adds_up(found):
     """Its sum is half the logarithm of the determinant of all information, however the passes are cut."""
     columns = table(found)
     scale = found.setup.states[0, :6]
-    units = np.concatenate([np.full(3, 0.1 * np.linalg.norm(scale[:3])), np.full(3, 0.1 * np.linalg.norm(scale[3:])), [0.0]])
-    units[6] = np.sqrt(found.problem.covariance[6, 6])
-    H = np.nan_to_num(found.analysis.rows[found.keep]).reshape(-1, 7) * units
-    whole = 0.5 * np.linalg.slogdet(np.eye(7) + H.T @ H)[1] / np.log(2.0)
+    units = np.sqrt(np.diag(found.problem.covariance))
+    units[:3], units[3:6] = 0.1 * np.linalg.norm(scale[:3]), 0.1 * np.linalg.norm(scale[3:])
+    H = np.nan_to_num(found.analysis.rows[found.keep]).reshape(-1, len(units)) * units
+    whole = 0.5 * np.linalg.slogdet(np.eye(len(units)) + H.T @ H)[1] / np.log(2.0)
     entries = np.arange(len(columns["t"]))
     for parts in (2, 7):
         passes = [("fixes", part) for part in np.split(entries, np.arange(1, parts) * (3 * len(T) // parts // 3 * 3))]

@@ -39,7 +39,7 @@ def tab(found: Any) -> Tab:
     passes = passes_of(found, columns)
     tone = {False: "bad", True: "good", None: "plain"}
     verdict = sorted(facts["verdict"].items(), key=lambda item: item[1]["ok"] is not False)
-    points = [Point(key.capitalize(), one["sentence"], tone[one["ok"]]) for key, one in verdict]  # type: ignore[arg-type]
+    points = [Point(*_said(one["sentence"]), tone[one["ok"]]) for _, one in verdict]  # type: ignore[arg-type]
     beside = _beside(found)
     parts = [
         *sections(found, path, rows),
@@ -100,3 +100,9 @@ def _beside(found: Any) -> Tab | None:
     whole = comparison_tab(Comparison(found.problem, found.tracking, tuple(rows), usable, found.object), orbit=False)
     folded = [Section(s.title, s.blocks, s.intro, folded=True) for s in whole.sections]
     return Tab(whole.title, "", [], folded, whole.keys, whole.times, whole.show_time)
+
+
+def _said(sentence: str) -> tuple[str, str]:
+    """The word that a sentence of the verdict begins with, which is its heading, and the rest of it."""
+    word, _, rest = sentence.partition(": ")
+    return word, rest[:1].upper() + rest[1:]
