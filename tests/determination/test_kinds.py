@@ -357,7 +357,7 @@ def test_directions_from_observers_that_move(about, axes):
     start = (centre + np.array([2e11, 1e11, 5e10]), speed + np.array([3e3, -2e3, 1e3])) if about == "sun" else (R, V)
     there = np.array([[-3e6, 5e6, 2.5e6], [-2e6, 5.5e6, 2.6e6], [-1e6, 6e6, 2.4e6], [1e6, 6.1e6, 2.2e6]])
     dates = [EPOCH + float(t) for t in T]
-    here = there if axes == "GCRF" else earth.transform(there, None, "ITRF", "GCRF", dates)[0]
+    here = there if axes == "GCRF" else earth.transform(there, None, "ITRF", "GCRF", dates, earth.SubdailyEOP())[0]
     if about == "sun":
         here = here + earth.body("earth", dates, "sun")[0]
     tau = np.zeros(4)

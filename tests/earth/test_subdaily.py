@@ -103,7 +103,7 @@ def test_they_are_asked_for_where_orientation_is(tmp_path):
     file = tmp_path / "finals"
     file.write_bytes(b"\n".join(Path(astropy_iers_data.IERS_A_FILE).read_bytes().splitlines()[:20]))
     assert earth.read_forces("degree=2 eop=subdaily", 800e3).eop == earth.SubdailyEOP()
-    assert "within the day" in str(earth.read_forces("degree=2 eop=subdaily", 800e3))
+    assert earth.read_forces("degree=2 eop=daily", 800e3).eop is None
     of_file = earth.read_forces(f"degree=2 eop=subdaily:{file}", 800e3).eop
     assert of_file.daily.source == str(file)
     assert written_orientation(of_file) == f"subdaily:{file}"

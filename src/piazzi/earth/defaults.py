@@ -105,7 +105,6 @@ class ForceChoice:
         words += [f"radiation ({f.radiation})"] if f.radiation else []
         words += [f"drag ({f.drag})"] if f.drag else []
         words += [f"empirical {', '.join(grouped(f.empirical))}"] if f.empirical else []
-        words += ["tides of UT1 and of the pole within the day"] if isinstance(self.eop, SubdailyEOP) else []
         return f"{', '.join(words)} ({self.source})"
 
 
