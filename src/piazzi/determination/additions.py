@@ -15,7 +15,7 @@ from piazzi.determination.orbit_forces import COEFFICIENTS, Chosen, usual_sigma
 from piazzi.determination.physical import by_shares
 from piazzi.determination.sensing import Measured
 from piazzi.determination.unknowns import DV, Asked, of_parameters
-from piazzi.earth.force_options import CONSTANT, ONCE_PER_REV, SUNLIGHT, grouped
+from piazzi.earth.force_options import EMPIRICAL, grouped
 from piazzi.earth.forces import unit_of
 from piazzi.problem import Gaussian
 
@@ -85,8 +85,7 @@ def _in_si(one: Asked, name: str) -> float:
 
 def _with_accelerations(chosen: Chosen, given: Sequence[Asked]) -> Chosen:
     """The forces with those empirical accelerations that are asked for and that they have not."""
-    known = (*CONSTANT, *ONCE_PER_REV, *SUNLIGHT)
-    new = [one.what.name for one in given if one.what.name in known and one.what.name not in chosen.forces.empirical]
+    new = [one.what.name for one in given if one.what.name in EMPIRICAL and one.what.name not in chosen.forces.empirical]
     return with_empirical(chosen, new) if new else chosen
 
 

@@ -32,8 +32,9 @@ from piazzi.formats.recognise import recognise
 from piazzi.kernels import RungeKutta8
 from piazzi.opening import opened as opened_file
 from piazzi.orbit import sgp4_states
+from piazzi.orbit.axes import in_axes
 from piazzi.orbit.paths import opened, path_of
-from piazzi.orbit.starting import in_axes, start_of
+from piazzi.orbit.starting import start_of
 from piazzi.problem import Gaussian, Problem
 from piazzi.problem.checks import Array
 

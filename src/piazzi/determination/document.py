@@ -11,13 +11,14 @@ from piazzi.determination.departures import departures
 from piazzi.determination.guesses import CARTESIAN, SCHEMA
 from piazzi.determination.initial_result import UndeterminedError
 from piazzi.determination.motion import words_of
-from piazzi.determination.orbit import definite_root, jacobian
+from piazzi.determination.orbit import definite_root
 from piazzi.determination.physical import believed, nodes_of, result_name, said, said_name
 from piazzi.determination.published import beside
 from piazzi.determination.residuals import groups, rejected
 from piazzi.determination.verdict import KEYS
 from piazzi.evaluate.quantities import finite
 from piazzi.orbit import transform_root
+from piazzi.orbit.axes import in_axes
 from piazzi.problem import Gaussian
 from piazzi.problem.checks import Array
 
@@ -96,7 +97,7 @@ def solution(found: Any) -> tuple[Array, Array]:
     if not (np.isfinite(mean).all() and np.isfinite(P).all()):
         return np.full(len(mean), np.nan), np.full(P.shape, np.nan)
     values, J = said(found.problem, mean)
-    J[:6, :6] = jacobian(found.frame, found.epoch, found.orbit.eop)
+    J[:6, :6] = in_axes("GCRF", found.frame, found.epoch, found.orbit.eop)
     values[:6] = J[:6, :6] @ mean[:6]
     return values, transform_root(definite_root(P), J)
 

@@ -20,7 +20,8 @@ from piazzi.earth.rotation import frame_named
 from piazzi.formats import Observations
 from piazzi.io import hdf5
 from piazzi.opening import opened
-from piazzi.orbit.starting import in_axes, start_of
+from piazzi.orbit.axes import in_axes
+from piazzi.orbit.starting import start_of
 from piazzi.problem.checks import Array
 
 AIR_THEN = "density"  # the name of the air's density at the epoch

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from piazzi.determination.centres import EARTH, Centre
-from piazzi.earth import Epoch, rotation_rate
+from piazzi.earth import Epoch
 from piazzi.earth.rotation import TURNING, frame_named
 from piazzi.earth.scales import Orientation
 from piazzi.earth.subdaily import WITHIN_THE_DAY
 from piazzi.orbit import Keplerian, state_axes, transform_root
+from piazzi.orbit.axes import in_axes
 from piazzi.problem.checks import Array
 from piazzi.text import brief
 
@@ -70,7 +71,7 @@ class Orbit:
         mean, P = (values[0] for values in self.beliefs([when]))
         if axes.upper().startswith(("RTN", "TNW")):
             return transform_root(definite_root(P), state_axes(mean[:3], mean[3:], axes, self.centre.mu))
-        return transform_root(definite_root(P), jacobian(frame_named(axes), when, self.eop))
+        return transform_root(definite_root(P), in_axes("GCRF", frame_named(axes), when, self.eop))
 
     def to(self, frame: str) -> Orbit:
         """The same orbit in other axes; those of the Earth turn as they did for its measurements."""
@@ -105,7 +106,7 @@ class Orbit:
     def states(self, epochs: Sequence[Epoch]) -> tuple[Array, Array]:
         """States (K, 6) and roots (K, 6, 6) of their covariances at dates, in `frame`."""
         mean, P = self.beliefs(epochs)
-        J = jacobian(self.frame, epochs, self.eop)
+        J = in_axes("GCRF", self.frame, epochs, self.eop)
         roots = np.stack([definite_root(one) for one in P]) if len(P) else P
         return np.asarray((J @ mean[..., None])[..., 0]), transform_root(roots, J)
 
@@ -122,16 +123,6 @@ class Orbit:
 
     def _epoch(self, given: Any) -> Epoch:
         return self.epoch if given is None else Epoch(given)
-
-
-def jacobian(frame: str, epoch: Any, eop: Orientation | None = WITHIN_THE_DAY) -> Array:
-    """Derivative (..., 6, 6) of a state in a frame by that in the GCRF, the turning of the axes among it."""
-    R, rate = rotation_rate("GCRF", frame, epoch, eop)
-    out = np.zeros((*R.shape[:-2], 6, 6))
-    out[..., :3, :3] = out[..., 3:, 3:] = R
-    if frame in TURNING:
-        out[..., 3:, :3] = rate
-    return out
 
 
 def definite_root(P: Array) -> Array:

@@ -13,7 +13,7 @@ from piazzi.determination.motion import Extra
 from piazzi.earth import ForceChoice, Forces, LaserSphere, laser_sphere, read_forces
 from piazzi.earth.defaults import AIR_BELOW, lowest_height
 from piazzi.earth.force_air import air
-from piazzi.earth.force_options import CONSTANT, SUNLIGHT, grouped
+from piazzi.earth.force_options import EMPIRICAL, SUNLIGHT, grouped
 from piazzi.earth.scales import Orientation
 from piazzi.earth.stepping import longest_step
 from piazzi.earth.subdaily import WITHIN_THE_DAY
@@ -162,9 +162,7 @@ def _coefficients(
     roles: dict[str, str] = {}
     values: dict[str, Any] = dict(choice.values)
     open_ = {text.partition(" = ")[0] for text in choice.assumed}
-    accelerations = [
-        name for name in choice.forces.parameters if name in open_ and name.partition("_")[0] in (*CONSTANT, "light")
-    ]
+    accelerations = [name for name in choice.forces.parameters if name in open_ and name in EMPIRICAL]
     own = {*COEFFICIENTS.values(), *accelerations}
     assumed = [text for text in choice.assumed if text.partition(" = ")[0] not in own]
     ratio, sphere = _ratio(name, mass, area)

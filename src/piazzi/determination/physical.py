@@ -23,6 +23,7 @@ from piazzi.problem.checks import Array
 POSITIVE = ("cr_a_m", "cd_a_m")
 SHARE, LOGARITHM, AIR, DENSITY = "_share", "_log", "air_", "density_"
 BEND = 0.01
+LIGHT = f"cr_a_m{SHARE}"
 DRAG, DRAG_LOGARITHM, WAVES = "cd_a_m_share", "cd_a_m_log", ("density_cos", "density_sin")
 USUAL = 1.0 - BEND  # the share of the usual value itself
 

@@ -15,14 +15,13 @@ import numpy as np
 
 from piazzi.determination.additions import with_empirical
 from piazzi.determination.analysis import analysed
+from piazzi.determination.density import SMALL
 from piazzi.determination.orbit_forces import DEPARTS
-from piazzi.determination.physical import DRAG_LOGARITHM, SHARE, slope_of, value_of
+from piazzi.determination.physical import DRAG_LOGARITHM, LIGHT, slope_of, value_of
 from piazzi.determination.setup import Setup, renewed
 from piazzi.earth.force_options import SUNLIGHT
 from piazzi.problem import Gaussian
 
-LIGHT = f"cr_a_m{SHARE}"
-SMALL = 0.1  # of a sigma, by which departures may move the measurements before they count
 SAID = (
     f"how sunlight departs from that on a sphere is estimated, in {len(SUNLIGHT)} shares of it, each 0 +- {DEPARTS:g} before "
     "the measurements (as ECOM has them: Springer et al. 1999, GPS Solut. 2, 50; Arnold et al. 2015, J. Geod. 89, 775)"

@@ -20,7 +20,7 @@ SUNLIGHT = {  # shares of what sunlight does to a sphere, and words for them
     "light_d_cos2": "sunlight toward the Sun: its cosine over half a turn",
     "light_d_sin2": "sunlight toward the Sun: its sine over half a turn",
 }
-_EMPIRICAL = (*CONSTANT, *ONCE_PER_REV, *SUNLIGHT)
+EMPIRICAL = (*CONSTANT, *ONCE_PER_REV, *SUNLIGHT)
 GROUPS = {"constant": CONSTANT, "once-per-rev": ONCE_PER_REV, "sunlight": tuple(SUNLIGHT)}
 UNITS = {
     "cr_a_m": "m^2/kg", "cd_a_m": "m^2/kg", "air_density": "kg/m^3", "air_height": "m", "air_scale": "m", "dv": "m/s",
@@ -35,7 +35,7 @@ _KNOWN: dict[str, dict[str, tuple[str, ...]]] = {
         "tides": tuple(TIDES),
         "relativity": _RELATIVITY,
         "shadows": _SHADOWS,
-        "empirical": (*GROUPS, *_EMPIRICAL),
+        "empirical": (*GROUPS, *EMPIRICAL),
         "harmonics": force_harmonics.HARMONICS,
         "nongravitational": (),
         "asteroids": (),
@@ -75,7 +75,7 @@ def several(about: str, name: str, given: bool | Sequence[str]) -> tuple[str, ..
             there = f"there are {', '.join(known)}" if known else f"there are none about the {about.title()}"
             raise ValueError(f"{name} has {one!r}; {there}{nearest(one, known)}")
     full = [each for one in given for each in GROUPS.get(one, (one,))]
-    ordered = sorted(full, key=_EMPIRICAL.index) if name == "empirical" else full
+    ordered = sorted(full, key=EMPIRICAL.index) if name == "empirical" else full
     return tuple(dict.fromkeys(ordered))
 
 

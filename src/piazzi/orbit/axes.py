@@ -15,6 +15,9 @@ from typing import Any
 import numpy as np
 
 from piazzi.arrays import Array
+from piazzi.earth.rotation import rotation_rate
+from piazzi.earth.scales import Orientation
+from piazzi.earth.subdaily import WITHIN_THE_DAY
 from piazzi.orbit.differential import check_mu, motion, states
 
 AXES = ("RTN", "TNW", "RTN_rotating", "TNW_rotating")
@@ -122,3 +125,15 @@ def _checked(axes: str) -> str:
     if axes not in AXES:
         raise ValueError(f"axes {axes!r} are not known; there are {', '.join(AXES)}")
     return axes
+
+
+def in_axes(origin: str, target: str, epochs: Any, eop: Orientation | None = WITHIN_THE_DAY) -> Array:
+    """Derivatives (..., 6, 6) of position and velocity in one frame by those in another; velocities are relative to the axes.
+
+    At an epoch, or at K of them; `eop` is the orientation of the Earth, None for the tables.
+    """
+    R, rate = rotation_rate(origin, target, epochs, eop)
+    out = np.zeros((*R.shape[:-2], 6, 6))
+    out[..., :3, :3] = out[..., 3:, 3:] = R
+    out[..., 3:, :3] = rate
+    return out

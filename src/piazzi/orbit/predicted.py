@@ -10,8 +10,7 @@ from piazzi.arrays import Array
 from piazzi.earth import Epoch
 from piazzi.earth.rotation import frame_named
 from piazzi.formats.ephemeris import Arc, Ephemeris
-from piazzi.orbit.axes import state_axes
-from piazzi.orbit.starting import in_axes
+from piazzi.orbit.axes import in_axes, state_axes
 
 
 def ephemeris_of(

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from piazzi.arrays import Array
-from piazzi.earth import Epoch, rotation_rate, transform
+from piazzi.earth import Epoch, transform
 from piazzi.earth.subdaily import WITHIN_THE_DAY
 from piazzi.formats.ephemeris import Arc, MeanElements
 from piazzi.formats.ocm import used_by
-from piazzi.orbit.axes import state_axes
+from piazzi.orbit.axes import in_axes, state_axes
 from piazzi.orbit.interpolation import interpolated
 from piazzi.orbit.mean_elements import sgp4_covariance, sgp4_states
 from piazzi.orbit.paths import opened
@@ -100,12 +100,3 @@ def _covariance(arc: Arc, k: int, state: Array) -> Array | None:
     J = state_axes(state[:3], state[3:], local).T if local else in_axes(frame, "GCRF", [arc.frame_epoch or arc.instant(k)])[0]
     P: Array = J @ arc.covariance[block[0]] @ J.T
     return 0.5 * (P + P.T)
-
-
-def in_axes(origin: str, target: str, epochs: list[Epoch]) -> Array:
-    """Derivatives (K, 6, 6) of position and velocity in one frame by those in another; velocities are relative to the axes."""
-    R, rate = rotation_rate(origin, target, epochs, WITHIN_THE_DAY)
-    out = np.zeros((len(epochs), 6, 6))
-    out[:, :3, :3] = out[:, 3:, 3:] = R
-    out[:, 3:, :3] = rate
-    return out
